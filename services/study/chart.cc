@@ -116,6 +116,12 @@ class Frame {
   const Chart& chart_;
 };
 
+// Colours repeat after ten, then dashed, and marks after six.
+std::string stroke_of(std::size_t style) {
+  return fmt::format("stroke=\"{}\" stroke-width=\"1.5\"{}", kCurveColours[style % kCurveColours.size()],
+                     style >= kCurveColours.size() ? " stroke-dasharray=\"5 3\"" : "");
+}
+
 // Labels where they cover no other; where there is no such place they are left out.
 class Labels {
  public:
@@ -141,9 +147,9 @@ class Labels {
   std::vector<Box> taken_;
 };
 
-std::string curve_text(const Frame& frame, const Curve& curve, std::size_t number, Labels* labels) {
+std::string curve_text(const Frame& frame, const Curve& curve, Labels* labels) {
+  const std::size_t number = curve.style;
   const std::string colour = kCurveColours[number % kCurveColours.size()];
-  const std::string dashes = number >= kCurveColours.size() ? " stroke-dasharray=\"5 3\"" : "";
   std::string points, marks;
   double height = 0.0;
   for (std::size_t i = 0; i < curve.marks.size(); ++i) {
@@ -157,8 +163,7 @@ std::string curve_text(const Frame& frame, const Curve& curve, std::size_t numbe
   if (curve.has_steps && !curve.marks.empty()) points += fmt::format("{:.2f},{:.2f} ", frame.right(), height);
   // inside of the edge, so that they are seen whole
   for (const double failed : curve.failed) marks += mark_text(number, frame.right(), frame.y(failed), true);
-  return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"{}/>\n{}", points, colour,
-                     dashes, marks);
+  return fmt::format("<polyline points=\"{}\" fill=\"none\" {}/>\n{}", points, stroke_of(number), marks);
 }
 
 }  // namespace
@@ -167,21 +172,18 @@ std::string draw(const Chart& chart) {
   const Frame frame(chart);
   Labels labels;
   std::string text = frame.axes() + frame.guides();
-  for (std::size_t i = 0; i < chart.curves.size(); ++i) text += curve_text(frame, chart.curves[i], i, &labels);
+  for (const Curve& curve : chart.curves) text += curve_text(frame, curve, &labels);
   return text;
 }
 
 std::string legend(const std::vector<Curve>& curves, double left, double top) {
   std::string text;
-  for (std::size_t i = 0; i < curves.size(); ++i) {
-    const double y = top + kLegendLine * static_cast<double>(i);
-    const std::string dashes = i >= kCurveColours.size() ? " stroke-dasharray=\"5 3\"" : "";
-    text +=
-        svg_line(left, y, left + 22.0, y,
-                 fmt::format("stroke=\"{}\" stroke-width=\"1.5\"{}", kCurveColours[i % kCurveColours.size()], dashes));
-    if (!curves[i].has_steps) text += mark_text(i, left + 11.0, y, false);
-    text +=
-        svg_text(left + 29.0, y + 4.0, curves[i].name + (curves[i].note.empty() ? "" : " (" + curves[i].note + ")"));
+  double y = top;
+  for (const Curve& curve : curves) {
+    text += svg_line(left, y, left + 22.0, y, stroke_of(curve.style));
+    if (!curve.has_steps) text += mark_text(curve.style, left + 11.0, y, false);
+    text += svg_text(left + 29.0, y + 4.0, curve.name + (curve.note.empty() ? "" : " (" + curve.note + ")"));
+    y += kLegendLine;
   }
   return text;
 }

@@ -1,6 +1,7 @@
 // Charts of curves as parts of an SVG: axes with ticks, curves with marks, what failed hollow at an edge, a legend.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@ struct Mark {
 
 struct Curve {
   std::string name;
+  std::size_t style = 0;  // its colour and mark
   std::vector<Mark> marks;
   std::vector<double> failed = {};  // y of hollow marks at the right edge
   std::string note = {};            // after the name, in the legend
@@ -35,7 +37,7 @@ struct Chart {
   double top = 0.0, left = 0.0, width = 440.0, height = 440.0;  // points, titles of axes outside
 };
 
-// Curves have the same colours and marks as their names in the legend, by their order.
+// Curves look as their names in the legend do. Styles repeat after 30.
 std::string draw(const Chart& chart);
 std::string legend(const std::vector<Curve>& curves, double left, double top);
 

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "services/recorder/svg.h"
 #include "services/study/analysis.h"
 #include "services/study/chart.h"
+#include "services/study/method.h"
 
 namespace gravitas::study {
 namespace {
@@ -16,10 +18,21 @@ namespace {
 constexpr double kLeast = 1e-16;  // no error is shown smaller
 constexpr double kTop = 76.0, kLeft = 62.0, kGap = 66.0, kLegendWidth = 340.0;
 
+// The same of a method in all diagrams.
+std::size_t style_of(const std::string& method) {
+  const std::span<const Method> offered = offered_methods();
+  const auto found = std::ranges::find(offered, method, &Method::name);
+  if (found != offered.end()) return static_cast<std::size_t>(found - offered.begin());
+  // others come after, by what they are called
+  std::size_t sum = 0;
+  for (const char letter : method) sum += static_cast<unsigned char>(letter);
+  return offered.size() + sum % 13;
+}
+
 using Work = std::function<double(const v1::Rung&)>;
 
 Curve curve_of(const v1::Ladder& ladder, const Work& work) {
-  Curve curve{ladder.method(), {}};
+  Curve curve{ladder.method(), style_of(ladder.method()), {}};
   int failed = 0, too_long = 0;
   for (const v1::Rung& rung : ladder.rungs()) {
     const double y = work(rung);
@@ -89,7 +102,7 @@ std::string profile_diagram(const v1::Study& study, double error) {
     Chart chart;
     double largest = 10.0;
     for (const Profile& profile : all) {
-      Curve curve{profile.method, {}};
+      Curve curve{profile.method, style_of(profile.method), {}};
       curve.has_steps = true;
       for (const double ratio : profile.ratios) {
         largest = std::max(largest, ratio);
@@ -98,7 +111,7 @@ std::string profile_diagram(const v1::Study& study, double error) {
       if (curve.marks.empty()) curve.note = "none";
       chart.curves.push_back(curve);
     }
-    chart.x = decades("CPU, as multiple of the cheapest method's", {1.12, largest});
+    chart.x = decades("CPU, as multiple of the cheapest method's", {2.0, largest});
     chart.y = {"", 0.0, 1.0, false};
     chart.title = fmt::format("{} problems {} contacts", problems, has_contacts ? "with" : "without");
     chart.left = left, chart.top = kTop - 16.0, chart.width = 360.0, chart.height = 300.0;

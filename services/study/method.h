@@ -38,8 +38,9 @@ struct Method {
 std::span<const Method> offered_methods();
 
 // Those that `words` name, in the order of the table: whole names, or parts of them in order ("RK4", "Smooth/RK4",
-// "Continuous"); of the latter on the tasks alone that they are offered for. SIMULATOR/INTEGRATOR/SOLVER of installed plugins that the table lacks is added; an integrator with an
-// Accuracy then climbs by it. Throws BadInput for a word that names nothing, with the nearest and the list.
+// "Continuous"), which count for the tasks alone that they are offered for. SIMULATOR/INTEGRATOR/SOLVER of plugins in
+// `installed` that the table lacks is added; an integrator with an Accuracy then climbs by it. Throws BadInput for a word that
+// names nothing, with the nearest and the list.
 std::vector<Method> named_methods(const std::vector<std::string>& words, const Catalog& installed);
 
 }  // namespace gravitas::study

@@ -41,6 +41,7 @@ struct Climb {
   v1::Problem result;
   Subject subject;
   std::vector<Method> methods;
+  unsigned tasks = 0;
   std::uint32_t steps = 1, look_every = 1;  // of the coarsest rung
   MeasureMaker measure;                     // empty: the scene's own reference is still to be found
 };
@@ -51,17 +52,19 @@ class StudyRun {
  public:
   StudyRun(const Options& options, const std::function<bool()>& interrupted,
            const std::function<void(const Progress&)>& report)
-      : options_(options),
-        installed_(Catalog::installed(installed_worker(), installed_plugins())),
-        wanted_(named_methods(options.methods, installed_)),
-        report_(report) {
+      : options_(options), installed_(Catalog::installed(installed_worker(), installed_plugins())), report_(report) {
     limits_.cpu_seconds = options.run_seconds > 0.0 ? options.run_seconds : options.is_short ? kShortRun : kLongRun;
     if (options.is_short) limits_.repeat_below = 0.02;
     limits_.interrupted = interrupted;
     if (!options.problems.empty() || options.scenes.empty())
       for (const Problem& problem : named_problems(options.problems)) add(problem);
     for (const std::string& scene : options.scenes) add(scene);
-    for (const std::unique_ptr<Climb>& climb : climbs_) ladders_ += climb->methods.size();
+    // plugins that scenes bring along are known by now
+    wanted_ = named_methods(options.methods, installed_);
+    for (const std::unique_ptr<Climb>& climb : climbs_) {
+      climb->methods = methods_for(climb->subject.has_contacts(), climb->tasks);
+      ladders_ += climb->methods.size();
+    }
     if (ladders_ == 0)
       throw BadInput("--methods: none of these suits the problems; Smooth is for bodies that cannot touch");
   }
@@ -107,7 +110,7 @@ class StudyRun {
   void add(const Problem& problem) {
     auto climb = std::make_unique<Climb>(scene_of(problem), &installed_);
     climb->steps = problem.steps;
-    climb->methods = methods_for(problem.task == kContacts, problem.task);
+    climb->tasks = problem.task;
     climb->measure = [known = problem.known](const kernel::EnvironmentDescription& description) {
       return std::make_unique<KnownMeasure>(known, description);
     };
@@ -124,7 +127,7 @@ class StudyRun {
     const double steps = std::clamp(subject.duration() / subject.time_step() / 4.0, 1.0, 1e6);
     climb->steps = static_cast<std::uint32_t>(std::lround(steps));
     climb->look_every = (climb->steps + kMostLooks - 1) / kMostLooks;
-    climb->methods = methods_for(subject.has_contacts(), subject.has_contacts() ? kContacts : kMotion | kStiff);
+    climb->tasks = subject.has_contacts() ? kContacts : kMotion | kStiff;
     describe(std::filesystem::path(scene).stem().string(), "own", climb.get());
     climbs_.push_back(std::move(climb));
   }

@@ -158,7 +158,8 @@ TEST(StudyGate, FilesAreReadLineByLine) {
 
 // As many marks as rungs that were run in either panel, and what failed is hollow.
 TEST(StudyDiagram, ShowsEveryRun) {
-  v1::Ladder ladder = ladder_of("A", 2.0, 1.0);
+  const std::string with_circles = "Basic/SemiImplicitEuler/Sequential";
+  v1::Ladder ladder = ladder_of(with_circles, 2.0, 1.0);
   ladder.mutable_rungs(0)->set_failed("it fell over");
   const std::string drawing = diagram(study_with({ladder}).problems(0));
   const auto count = [&](const std::string& part) {
@@ -168,7 +169,22 @@ TEST(StudyDiagram, ShowsEveryRun) {
   };
   EXPECT_EQ(count("<circle"), 2U * 8U + 1U);
   EXPECT_EQ(count("fill=\"white\" stroke"), 2U);
-  EXPECT_THAT(drawing, AllOf(HasSubstr("A (1 failed)"), HasSubstr("CPU s per simulated s"), HasSubstr("0.05 s")));
+  EXPECT_THAT(drawing,
+              AllOf(HasSubstr(with_circles + " (1 failed)"), HasSubstr("CPU s per simulated s"), HasSubstr("0.05 s")));
+}
+
+// A method looks the same whatever stands beside it.
+TEST(StudyDiagram, MethodsLookTheSameInAll) {
+  const std::string alone = diagram(study_with({ladder_of("Smooth/RK4/Direct", 2.0, 1.0)}).problems(0));
+  const std::string beside = diagram(
+      study_with({ladder_of("Smooth/Verlet/Direct", 1.0, 3.0), ladder_of("Smooth/RK4/Direct", 2.0, 1.0)}).problems(0));
+  const auto line_of = [](const std::string& drawing, const std::string& name) {
+    const std::size_t word = drawing.find(">" + name + "<"), line = drawing.rfind("<line", word);
+    const std::size_t stroke = drawing.find("stroke=", line);
+    return drawing.substr(stroke, drawing.find("/>", stroke) - stroke);
+  };
+  EXPECT_EQ(line_of(alone, "Smooth/RK4/Direct"), line_of(beside, "Smooth/RK4/Direct"));
+  EXPECT_NE(line_of(beside, "Smooth/Verlet/Direct"), line_of(beside, "Smooth/RK4/Direct"));
 }
 
 // ---- the program

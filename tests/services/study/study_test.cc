@@ -239,6 +239,29 @@ TEST(Study, OfAnOwnScene) {
   EXPECT_THAT(page(study), Not(HasSubstr("What failed")));
 }
 
+// A plugin that only the scene knows is a method like others: semi-implicit Euler once more.
+TEST(Study, OfAnOwnPlugin) {
+  Options options = tiny({}, {"Basic/Roomy/Sequential", "Basic/SemiImplicitEuler/Sequential"}, 6);
+  const harness::ScratchFolder folder;
+  options.scenes = {folder.write("thrown.gravitas", R"(
+    Forces { Force { Type = "Spring" Id = "Pull" CustomProperties { Stiffness = 10 RestLength = 0.5 } } }
+    Simulator { Type = "Basic" Id = "Main" CustomProperties { TimeStep = 0.01 Duration = 1 } }
+    Environment { Id = "World"
+      Space { Bodies { Body { Id = "Bob" Mass = 1 PrincipalMoments = {0.1, 0.2, 0.1} Forces = {"Pull"}
+        KineticProperties { Position = {1, 0, 0} LinearVelocity = {0, 1, 0} } } } }
+    }
+    Plugins { Plugin { Slot = "integrator" Library = ")" +
+                                                        in_build("/lib/gravitas-honest/integrator_roomy.so") +
+                                                        R"(" } })")};
+  const v1::Study study = study_of(options);
+  ASSERT_EQ(study.problems(0).ladders_size(), 2);
+  const v1::Ladder &known = study.problems(0).ladders(0), &own = study.problems(0).ladders(1);
+  EXPECT_EQ(own.method(), "Basic/Roomy/Sequential");
+  EXPECT_NEAR(own.observed_order(), 1.0, 0.2);
+  for (int i = 0; i < own.rungs_size(); ++i) EXPECT_NEAR(own.rungs(i).error(), known.rungs(i).error(), 1e-12);
+  EXPECT_THAT(refusal_of(tiny({}, {"Basic/Roomy/Sequential"}, 3)), HasSubstr("no method is called so"));
+}
+
 // ---- springs
 
 TEST(StudyStability, EngineAgreesWithTheTheory) {
