@@ -20,7 +20,6 @@
 #include "services/study/diagram.h"
 #include "services/study/gate.h"
 #include "services/study/method.h"
-#include "services/study/problem.h"
 #include "services/study/study.h"
 #include "services/study/tables.h"
 
@@ -79,10 +78,15 @@ class StudyFolder {
   std::optional<OutputFile> table_;
 };
 
-int list_study() {
+int list_study(bool json) {
+  const study::v1::Study all = study::list();
+  if (json) {
+    std::cout << to_json(all, JsonForm::kPage);
+    return kDone;
+  }
   std::cout << fmt::format("{:<20} {:<9} {}\n", "problem", "family", "error against");
-  for (const study::Problem& problem : study::shipped_problems())
-    std::cout << fmt::format("{:<20} {:<9} {}\n", problem.name, problem.family, problem.reference);
+  for (const study::v1::Problem& problem : all.problems())
+    std::cout << fmt::format("{:<20} {:<9} {}\n", problem.name(), problem.family(), problem.reference());
   std::cout << fmt::format("\n{:<40} {:<10} {:<7} {}\n", "method", "climbs", "order", "problems");
   for (const study::Method& method : study::offered_methods()) {
     std::string tasks;
@@ -96,12 +100,19 @@ int list_study() {
   return kDone;
 }
 
+// The demands of --gate, or the built-in ones.
+std::vector<study::Demand> demands_of(const StudyLine& line) {
+  if (line.gate.empty()) return study::built_in_demands();
+  std::vector<std::string> problems;
+  for (const std::string& scene : line.options.scenes) problems.push_back(study::problem_name(scene));
+  return study::read_demands(line.gate, problems, line.options.methods);
+}
+
 int run_study(StudyLine* line) {
-  if (line->lists) return list_study();
+  if (line->lists) return list_study(line->json);
   listen_to_interrupts();
   let_writes_fail();
-  const std::vector<study::Demand> demands =
-      line->gate.empty() ? study::built_in_demands() : study::read_demands(line->gate);
+  const std::vector<study::Demand> demands = demands_of(*line);
   study::v1::Study result;
   {
     StatusLine progress;

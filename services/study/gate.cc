@@ -85,7 +85,10 @@ std::vector<Demand> built_in_demands() {
   return demands;
 }
 
-std::vector<Demand> read_demands(const std::string& path) {
+std::vector<Demand> read_demands(const std::string& path, std::vector<std::string> problems,
+                                 std::vector<std::string> methods) {
+  for (const Problem& problem : shipped_problems()) problems.push_back(problem.name);
+  for (const Method& method : offered_methods()) methods.push_back(method.name());
   std::ifstream file(path);
   if (!file) throw BadInput(fmt::format("--gate {}: it cannot be read", path));
   std::vector<std::string> words;
@@ -112,6 +115,11 @@ std::vector<Demand> read_demands(const std::string& path) {
                          known->numbers == 1 ? "" : "s"));
     (known->numbers == 1 ? demand.high : demand.low) = numbers[0];
     if (known->numbers == 2) demand.high = numbers[1];
+    // a slip would be demanded of nothing
+    if (std::ranges::find(problems, demand.problem) == problems.end())
+      refuse(fmt::format("problem \"{}\": {}", demand.problem, allowed_names(demand.problem, problems)));
+    if (std::ranges::find(methods, demand.method) == methods.end())
+      refuse(fmt::format("method \"{}\": {}", demand.method, allowed_names(demand.method, methods)));
     demands.push_back(std::move(demand));
   }
   if (demands.empty()) throw BadInput(fmt::format("{}: error: it demands nothing", path));

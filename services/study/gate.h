@@ -30,8 +30,10 @@ std::vector<Demand> built_in_demands();
 //   error PROBLEM METHOD LARGEST
 //   order PROBLEM METHOD LOWEST HIGHEST
 //   evaluations PROBLEM METHOD ERROR LARGEST
-// Throws BadInput with file and line.
-std::vector<Demand> read_demands(const std::string& path);
+// PROBLEM and METHOD are names of those that there are (shipped and offered), or of `problems` and `methods`. Throws BadInput
+// with file and line.
+std::vector<Demand> read_demands(const std::string& path, std::vector<std::string> problems,
+                                 std::vector<std::string> methods);
 
 // Fills failures and demands of the study. What was not run is not looked at; an order is not missed by a ladder that came
 // to the end of its CPU before it could show one.

@@ -46,6 +46,14 @@ struct Climb {
   MeasureMaker measure;                     // empty: the scene's own reference is still to be found
 };
 
+v1::Ladder* add_ladder(const Method& method, v1::Problem* problem) {
+  v1::Ladder* ladder = problem->add_ladders();
+  ladder->set_method(method.name());
+  ladder->set_climbs(method.climbs_accuracy() ? "Accuracy" : "TimeStep");
+  ladder->set_order(method.order);
+  return ladder;
+}
+
 bool suits(const Method& method, bool has_contacts) { return method.bears_contacts() || !has_contacts; }
 
 class StudyRun {
@@ -128,7 +136,7 @@ class StudyRun {
     climb->steps = static_cast<std::uint32_t>(std::lround(steps));
     climb->look_every = (climb->steps + kMostLooks - 1) / kMostLooks;
     climb->tasks = subject.has_contacts() ? kContacts : kMotion | kStiff;
-    describe(std::filesystem::path(scene).stem().string(), "own", climb.get());
+    describe(problem_name(scene), "own", climb.get());
     climbs_.push_back(std::move(climb));
   }
 
@@ -159,10 +167,7 @@ class StudyRun {
   }
 
   void climb_ladder(const Climb& climb, const Method& method, v1::Problem* result) {
-    v1::Ladder* ladder = result->add_ladders();
-    ladder->set_method(method.name());
-    ladder->set_climbs(method.climbs_accuracy() ? "Accuracy" : "TimeStep");
-    ladder->set_order(method.order);
+    v1::Ladder* ladder = add_ladder(method, result);
     std::string too_long;
     for (const Setting& setting : settings(climb, method)) {
       report_({done_, ladders_, result->name(), method.name()});
@@ -208,6 +213,24 @@ class StudyRun {
 };
 
 }  // namespace
+
+std::string problem_name(const std::string& scene) { return std::filesystem::path(scene).stem().string(); }
+
+v1::Study list() {
+  v1::Study study;
+  for (const Problem& problem : shipped_problems()) {
+    v1::Problem* result = study.add_problems();
+    result->set_name(problem.name);
+    result->set_family(problem.family);
+    result->set_scene(scene_of(problem));
+    result->set_reference(problem.reference);
+    result->set_uncertainty(problem.uncertainty);
+    result->set_has_contacts(problem.task == kContacts);
+    for (const Method& method : offered_methods())
+      if ((method.tasks & problem.task) != 0) add_ladder(method, result);
+  }
+  return study;
+}
 
 v1::Study run(const Options& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress) {

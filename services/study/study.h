@@ -29,6 +29,12 @@ struct Options {
 inline constexpr double kLongRun = 4.0, kShortRun = 0.25;  // s
 inline constexpr std::uint32_t kRungs = 12;
 
+// What a scene of the user's is called: its file's name without folder and ending.
+std::string problem_name(const std::string& scene);
+
+// The problems that are shipped, each with the ladders that are offered for it, and nothing measured.
+v1::Study list();
+
 struct Progress {
   std::size_t done, all;  // ladders
   std::string problem, method;

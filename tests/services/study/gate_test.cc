@@ -134,14 +134,14 @@ TEST(StudyGate, FailsWhereOrderErrorOrWorkIsMissed) {
 TEST(StudyGate, FilesAreReadLineByLine) {
   const ScratchFolder folder;
   const std::string path = folder.write("gate", "# ours\nerror top A 1e-9\norder top A 1.8 2.2 # of the theory\n\n");
-  const std::vector<Demand> demands = read_demands(path);
+  const std::vector<Demand> demands = read_demands(path, {"top"}, {"A"});
   ASSERT_EQ(demands.size(), 2U);
   EXPECT_EQ(demands[0].high, 1e-9);
   EXPECT_EQ(demands[1].low, 1.8);
   EXPECT_EQ(demands[1].high, 2.2);
   const auto refusal = [&](const std::string& text) {
     try {
-      read_demands(folder.write("gate", text));
+      read_demands(folder.write("gate", text), {"top"}, {"A"});
     } catch (const BadInput& refused) {
       return std::string(refused.what());
     }
@@ -152,6 +152,9 @@ TEST(StudyGate, FilesAreReadLineByLine) {
   EXPECT_THAT(refusal("order top A 1\n"),
               HasSubstr("gate:1: error: \"order top A 1\"; allowed: order PROBLEM METHOD and 2 numbers"));
   EXPECT_THAT(refusal("error top A 1 2\n"), HasSubstr("and 1 number >= 0"));
+  EXPECT_THAT(refusal("error heavy_to A 1\n"),
+              HasSubstr("gate:1: error: problem \"heavy_to\": did you mean \"heavy_top\"?"));
+  EXPECT_THAT(refusal("error top Smooth/RK5/Direct 1\n"), HasSubstr("did you mean \"Smooth/RK4/Direct\"?"));
   EXPECT_THAT(refusal("# nothing\n"), HasSubstr("it demands nothing"));
   EXPECT_GT(built_in_demands().size(), 30U);
 }
@@ -225,6 +228,8 @@ TEST(StudyProgram, LeavesNothingBehindWhereItRefuses) {
   EXPECT_EQ(run_program({"study"}, folder).exit_code, 2);
   EXPECT_THAT(run_program({"study", "--list"}, folder).out,
               AllOf(HasSubstr("heavy_top"), HasSubstr("Smooth/Radau/Direct")));
+  EXPECT_THAT(run_program({"study", "--list", "--json"}, folder).out,
+              AllOf(HasSubstr("\"name\": \"heavy_top\""), HasSubstr("\"method\": \"Smooth/Radau/Direct\"")));
 }
 
 TEST(StudyProgram, KeepsWhatItHasWhenInterrupted) {
