@@ -30,8 +30,9 @@ constexpr DemandWord kDemandWords[] = {{"error", Demand::What::kError, 1},
 const v1::Ladder* find_ladder(const v1::Study& study, const Demand& demand) {
   for (const v1::Problem& problem : study.problems())
     for (const v1::Ladder& ladder : problem.ladders())
-      // one that somebody interrupted is none
-      if (problem.name() == demand.problem && ladder.method() == demand.method && ladder.rungs_size() > 0)
+      // a ladder that somebody interrupted at once is none
+      if (problem.name() == demand.problem && !(demand.is_of_shipped && problem.family() == "own") &&
+          ladder.method() == demand.method && ladder.rungs_size() > 0)
         return &ladder;
   return nullptr;
 }
@@ -75,12 +76,12 @@ std::vector<Demand> built_in_demands() {
   std::vector<Demand> demands;
   for (const Problem& problem : shipped_problems()) {
     for (const Bound& bound : problem.bounds)
-      demands.push_back({Demand::What::kError, problem.name, bound.method, 0.0, bound.error});
+      demands.push_back({Demand::What::kError, problem.name, bound.method, 0.0, bound.error, true});
     for (const Method& method : offered_methods())
       if ((method.tasks & problem.task) != 0 && method.order > 0.0 &&
           std::ranges::find(problem.orders, method.integrator) != problem.orders.end())
         demands.push_back({Demand::What::kOrder, problem.name, method.name(), method.order - kOrderTolerance,
-                           method.order + kOrderTolerance});
+                           method.order + kOrderTolerance, true});
   }
   return demands;
 }

@@ -18,6 +18,7 @@ struct Demand {
   What what;
   std::string problem, method;
   double low, high;
+  bool is_of_shipped = false;  // not of a scene of the user's that is called so, too
 };
 
 // A method's order is to be within this of the theory's.

@@ -140,7 +140,11 @@ class StudyRun {
     climbs_.push_back(std::move(climb));
   }
 
-  static void describe(const std::string& name, const char* family, Climb* climb) {
+  void describe(const std::string& name, const char* family, Climb* climb) const {
+    for (const std::unique_ptr<Climb>& other : climbs_)
+      if (other->result.name() == name)
+        throw BadInput(fmt::format("{} and {}: both problems are called {}; allowed: files of different names",
+                                   other->subject.path(), climb->subject.path(), name));
     climb->result.set_name(name);
     climb->result.set_family(family);
     climb->result.set_scene(climb->subject.path());

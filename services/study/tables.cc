@@ -25,9 +25,11 @@ double best_error(const v1::Ladder& ladder) {
   return best;
 }
 
-std::string best_text(const v1::Ladder& ladder) {
+// What is better than the reference nobody can say.
+std::string best_text(const v1::Ladder& ladder, double uncertainty) {
   const double best = best_error(ladder);
-  return std::isinf(best) ? "none" : fmt::format("{:.1e}", best);
+  if (std::isinf(best)) return "none";
+  return best < uncertainty ? fmt::format("<{:.0e}", uncertainty) : fmt::format("{:.1e}", best);
 }
 
 // Milliseconds per simulated second to each of kWantedErrors.
@@ -62,7 +64,7 @@ std::string problem_section(const v1::Problem& problem) {
       problem.name(), problem.family(), problem.duration(), problem.reference(), problem.uncertainty());
   for (const v1::Ladder& ladder : problem.ladders())
     text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", ladder.method(),
-                        fmt::join(times_to(ladder), " | "), best_text(ladder),
+                        fmt::join(times_to(ladder), " | "), best_text(ladder, problem.uncertainty()),
                         ladder.order() > 0.0 ? fmt::format("{:g}", ladder.order()) : kNone, order_text(ladder),
                         achieved_text(ladder), ladder.rungs_size(), failed_rungs(ladder), long_rungs(ladder));
   return text;
@@ -213,7 +215,7 @@ std::string summary(const v1::Study& study) {
                     "1e-6", "1e-9", "best", "order", "rungs", "failed", "too long");
     for (const v1::Ladder& ladder : problem.ladders()) {
       std::vector<std::string> cells = times_to(ladder);
-      cells.push_back(best_text(ladder));
+      cells.push_back(best_text(ladder, problem.uncertainty()));
       cells.push_back(order_text(ladder));
       for (std::string& cell : cells)
         if (cell == kNone) cell = "-";

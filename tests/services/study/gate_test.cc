@@ -124,6 +124,10 @@ TEST(StudyGate, FailsWhereOrderErrorOrWorkIsMissed) {
   v1::Study other = study;
   apply_gate({{What::kOrder, "top", "B", 1.8, 2.2}, {What::kOrder, "spin", "A", 1.8, 2.2}}, &other);
   EXPECT_EQ(other.demands(), 0U);
+  // the built-in demands are none of a scene that is called like a shipped one
+  other.mutable_problems(0)->set_family("own");
+  apply_gate({{What::kError, "top", "A", 0.0, 1e-30, true}}, &other);
+  EXPECT_EQ(other.demands(), 0U);
   const v1::Study few = study_with({ladder_of("A", 2.0, 1.0, 3)});
   EXPECT_THAT(failures_of(few, {What::kOrder, "top", "A", 1.8, 2.2}), ElementsAre(HasSubstr("shows no order")));
   v1::Study slow = few;

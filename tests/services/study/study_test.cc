@@ -168,6 +168,10 @@ TEST(Study, RefusesWhatIsNotThere) {
   Options options = tiny({}, {}, 3);
   options.scenes = {"no_such.gravitas"};
   EXPECT_THAT(refusal_of(options), HasSubstr("no_such.gravitas"));
+  // their files would be one
+  options = tiny({"bounce"}, {}, 3);
+  options.scenes = {in_source("/deploy/scenes/bounce.gravitas")};
+  EXPECT_THAT(refusal_of(options), HasSubstr("both problems are called bounce"));
 }
 
 // A combination of installed plugins that the table lacks.
