@@ -100,9 +100,9 @@ int list_study(bool json) {
   return kDone;
 }
 
-// The demands of --gate, or the built-in ones.
+// The demands of --gate, or the built-in ones, which are of whole ladders.
 std::vector<study::Demand> demands_of(const StudyLine& line) {
-  if (line.gate.empty()) return study::built_in_demands();
+  if (line.gate.empty()) return line.options.rungs == 0 ? study::built_in_demands() : std::vector<study::Demand>();
   std::vector<std::string> problems;
   for (const std::string& scene : line.options.scenes) problems.push_back(study::problem_name(scene));
   return study::read_demands(line.gate, problems, line.options.methods);
@@ -175,7 +175,8 @@ void add_study(CLI::App* app, Action* action) {
   command
       ->add_option("--rungs", options.rungs, "Settings of a ladder, at most; 12 time steps and 23 accuracies if absent")
       ->check(whole_number(3, 20));
-  command->add_option("--gate", line->gate, "Demands instead of the built-in ones");
+  command->add_option("--gate", line->gate,
+                      "File of demands instead of the built-in ones, which are of whole ladders: none with --rungs");
   CLI::Option* out = command->add_option("--out", line->out, "Folder for what is written");
   command->add_flag("--list", line->lists, "Print problems and methods instead");
   command->add_flag("--json", line->json, "Print JSON");

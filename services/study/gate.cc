@@ -8,6 +8,7 @@
 #include <iterator>
 #include <limits>
 #include <sstream>
+#include <utility>
 
 #include "plugin_sdk/near_miss.h"
 #include "services/run/session.h"

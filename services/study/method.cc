@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <iterator>
 #include <optional>
+#include <utility>
 
 #include "plugin_sdk/near_miss.h"
 #include "services/run/session.h"

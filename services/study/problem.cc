@@ -24,7 +24,7 @@ constexpr const char* kImpacts = "Continuous/Verlet/Newton";
 constexpr const char* kExact = "Continuous/Verlet/Newton/Accuracy";
 constexpr const char* kLStable = "Smooth/Radau/Direct";
 
-// Those with steps of a given order above 1: in the middle of these ladders the leading term stands alone.
+// Those of an order above 1 with steps: here their leading term stands alone from coarse rungs on.
 std::vector<std::string> higher_orders() { return {"Verlet", "ImplicitMidpoint", "RK4", "SymplecticSplitting"}; }
 
 Known position(const char* body, double time, std::vector<double> value, double size = 1.0) {
@@ -74,7 +74,7 @@ const std::vector<Problem>& problem_table() {
        1e-15,
        {position("Bob", 10, {-0.275087462576116860, -0.961419205099125064, 0})},
        {{kFast, 1e-10}, {kSteps, 1e-6}},
-       {"ImplicitMidpoint", "RK4", "SymplecticSplitting"}},
+       {"ImplicitMidpoint", "SymplecticSplitting"}},
       {"spherical_pendulum",
        "smooth",
        kMotion,
@@ -83,7 +83,7 @@ const std::vector<Problem>& problem_table() {
        1e-15,
        {position("Bob", 10, {0.04578256339846101085, -0.7377486044706621106, -0.6735213088613132007})},
        {{kFast, 1e-10}, {kSteps, 1e-6}},
-       higher_orders()},
+       {"ImplicitMidpoint", "SymplecticSplitting"}},
       {"heavy_top",
        "smooth",
        kMotion,

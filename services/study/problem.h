@@ -37,7 +37,8 @@ struct Problem {
   double uncertainty;  // of the reference, a share of its size
   std::vector<Known> known;
   std::vector<Bound> bounds;
-  // Integrators whose ladders are to show the order of their theory: the others' are not yet there, or go beyond it.
+  // Integrators whose ladders are to show the order of their theory, however few of their finer rungs a slow machine runs:
+  // the others' are not yet there, or go beyond it.
   std::vector<std::string> orders = {};
 };
 

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
+#include <span>
 #include <stop_token>
+#include <string_view>
 #include <utility>
 
 #include "plugin_sdk/body.h"

@@ -6,7 +6,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "gravitas/study/v1/study.pb.h"
 #include "kernel/description.h"

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
-#include <optional>
+#include <span>
 #include <utility>
 
 #include "services/catalog/catalog.h"

@@ -8,7 +8,9 @@
 
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <string>
+#include <vector>
 
 #include "services/run/session.h"
 #include "services/study/analysis.h"
@@ -204,12 +206,12 @@ TEST(StudyProgram, WritesWhatItMeasuredAndFailsByItsGate) {
       "study", "--problems", "point_pendulum,bounce", "--methods", "RK4,Continuous", "--rungs", "3", "--short",
       "--out", out};
   ProgramResult result = run_program(words, folder);
-  // three rungs show no order
-  EXPECT_EQ(result.exit_code, 4) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("point_pendulum, Smooth/RK4/Direct: its ladder shows no order"));
+  // the built-in demands are of whole ladders
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("the gate demands nothing of what was run"));
   for (const char* file : {"study.csv", "STUDY.md", "point_pendulum.svg", "bounce.svg", "profile.svg"})
     EXPECT_TRUE(std::filesystem::exists(out + "/" + file)) << file;
-  EXPECT_THAT(read_file(out + "/STUDY.md"), AllOf(HasSubstr("## bounce"), HasSubstr("Gate: the gate failed")));
+  EXPECT_THAT(read_file(out + "/STUDY.md"), AllOf(HasSubstr("## bounce"), HasSubstr("Gate: the gate demands nothing")));
   EXPECT_THAT(read_file(out + "/study.csv"), HasSubstr("\npoint_pendulum,smooth,Smooth/RK4/Direct,TimeStep,0.25,"));
 
   words.insert(words.end(), {"--json", "--gate", gate});
@@ -217,6 +219,7 @@ TEST(StudyProgram, WritesWhatItMeasuredAndFailsByItsGate) {
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_THAT(result.out,
               AllOf(HasSubstr("\"failures\": ["), HasSubstr("at most 1e-30 is wanted"), HasSubstr("\"demands\": 1")));
+  EXPECT_THAT(read_file(out + "/STUDY.md"), HasSubstr("Gate: the gate failed: 1 of 1 demands"));
 
   words.back() = folder.write("gate", "error point_pendulum Smooth/RK4/Direct 0.1\n");
   EXPECT_EQ(run_program(words, folder).exit_code, 0);
