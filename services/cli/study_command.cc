@@ -20,6 +20,7 @@
 #include "services/study/diagram.h"
 #include "services/study/gate.h"
 #include "services/study/method.h"
+#include "services/study/stability_diagram.h"
 #include "services/study/study.h"
 #include "services/study/tables.h"
 
@@ -60,7 +61,10 @@ class StudyFolder {
   void write(const study::v1::Study& study) {
     table_->write(study::csv(study));
     table_->close();
-    if (study.limits_size() > 0) write("stability.csv", study::stability_csv(study));
+    if (study.limits_size() > 0) {
+      write("stability.csv", study::stability_csv(study));
+      write("stability.svg", study::stability_diagram(study));
+    }
     for (const study::v1::Problem& problem : study.problems()) write(problem.name() + ".svg", study::diagram(problem));
     write("profile.svg", study::profile_diagram(study, kProfileError));
     write("STUDY.md", study::page(study));
@@ -142,7 +146,7 @@ void add_study(CLI::App* app, Action* action) {
   command->footer(
       "Writes DIR/STUDY.md (tables, what was observed against theory), DIR/study.csv (every run), a diagram a problem "
       "and "
-      "profile.svg, and stability.csv.\n"
+      "profile.svg, stability.csv and stability.svg.\n"
       "Errors and evaluations are the same on every machine, times are not. Exit code 4: the gate failed, an observed "
       "order "
       "more than 0.2 off the theory or an error above its bound; times are not judged.\n"

@@ -120,12 +120,10 @@ std::string stability_section(const v1::Study& study) {
   for (const v1::Limit& limit : study.limits())
     if (std::ranges::find(zetas, limit.zeta()) == zetas.end()) zetas.push_back(limit.zeta());
   std::string text =
-      "\n## Where integrators are stable\n\nA spring k with damper c on 1 kg, step h: k h^2 at which the theory's "
-      "growth "
-      "first exceeds 1, for zeta = c / (2 sqrt(k));\n0: at once. Beside it how many cells the engine, measured, agrees "
-      "on; "
-      "all stand in `stability.csv`. Adaptive\nintegrators: of one whole step, which their error control would "
-      "shorten.\n\n"
+      "\n## Where integrators are stable\n\n![map of stability](stability.svg)\n\n"
+      "A spring k with damper c on 1 kg, step h: k h^2 at which the theory's growth first exceeds 1, for zeta =\n"
+      "c / (2 sqrt(k)); 0: at once. Beside it how many cells the engine, measured, agrees on; all stand in\n"
+      "`stability.csv`. Adaptive integrators: of one whole step, which their error control would shorten.\n\n"
       "| integrator |";
   for (const double zeta : zetas) text += zeta == 0.0 ? " undamped |" : fmt::format(" zeta {:g} |", zeta);
   text += " cells that agree |\n| --- | --- |";
@@ -187,19 +185,13 @@ std::string stability_csv(const v1::Study& study) {
 std::string page(const v1::Study& study) {
   std::string text = fmt::format(
       "# Error against run time\n\nWritten by `gravitas study`{}; build {}, {}.\n\n"
-      "Each method climbs a ladder of settings, from useless to rounding: a time step that halves, or an accuracy. "
-      "Errors "
-      "are\ndimensionless: the largest of distances as shares of the problem's size, and of angles in rad. Columns "
-      "1e-3, "
-      "1e-6, 1e-9:\nCPU of the cheapest rung that is at least as good, in ms per simulated second; {} : none is. "
-      "Order: the "
-      "median slope of\nerror against step. Achieved / requested: geometric mean over the rungs of an accuracy. "
-      "Hosting "
-      "direct, one thread. Every\nrun stands in `study.csv`, what failed included. Diagrams: curves lead from the "
-      "coarsest "
-      "setting to the finest; hollow\nmarks failed; in the grey band the reference itself is no better; dashed: slopes "
-      "of the "
-      "orders 1, 2, 4.\n\n",
+      "Each method climbs a ladder of settings, from useless to rounding: a time step that halves, or an accuracy.\n"
+      "Errors are dimensionless: the largest of distances as shares of the problem's size, and of angles in rad.\n"
+      "Columns 1e-3, 1e-6, 1e-9: CPU of the cheapest rung that is at least as good, in ms per simulated second;\n"
+      "{} : none is. Order: the median slope of error against step. Achieved / requested: geometric mean over the\n"
+      "rungs of an accuracy. Hosting direct, one thread. Every run stands in `study.csv`, what failed included.\n"
+      "Diagrams: curves lead from the coarsest setting to the finest; hollow marks failed; in the grey band the\n"
+      "reference itself is no better; dashed: slopes of the orders 1, 2, 4.\n\n",
       study.is_interrupted() ? ", which was interrupted" : "", study.build(), study.processor(), kNone);
   text += "Gate: " + gate_text(study);
   for (const v1::Problem& problem : study.problems()) text += problem_section(problem);

@@ -17,6 +17,7 @@
 #include "services/study/rung.h"
 #include "services/study/self_reference.h"
 #include "services/study/spring_stability.h"
+#include "services/study/stability_diagram.h"
 #include "services/study/tables.h"
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
@@ -279,6 +280,20 @@ TEST(StudyStability, EngineAgreesWithTheTheory) {
     if (limit.integrator() == "RK4") EXPECT_NEAR(limit.theory(), 8.0, 1e-4);
     if (limit.integrator() == "Radau") EXPECT_FALSE(limit.has_theory());
   }
+  v1::Study study;
+  std::ptrdiff_t cells = 0, limited = 0;
+  for (const v1::Limit& limit : limits) {
+    *study.add_limits() = limit;
+    cells += limit.cells_size(), limited += limit.has_theory() && limit.theory() > 0.0;
+  }
+  const std::string drawing = stability_diagram(study);
+  const auto count = [&](const std::string& part) {
+    std::ptrdiff_t found = 0;
+    for (std::size_t at = drawing.find(part); at != std::string::npos; at = drawing.find(part, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("<rect"), 1 + cells);
+  EXPECT_EQ(count("stroke=\"black\""), limited);
 }
 
 }  // namespace
