@@ -142,16 +142,18 @@ TEST_P(SoftStops, HoldWhateverTheirStiffness) {
     for (const double damping : {0.0, 1e2, 1e6}) {
       SceneRun falling(scene(soft_guide(-0.3, 0.2, stiffness, damping), 1.0 / 60.0, 3.0), overrides());
       const double energy = falling.energy();
+      double lowest = 0.0;
       while (!falling.is_done()) {
         falling.step();
+        lowest = std::min(lowest, falling.body("A").pose.position.y());
         const double beyond = std::max(0.0, -0.3 - falling.body("A").pose.position.y());
         EXPECT_LE(falling.energy(), energy + 0.2) << stiffness << ' ' << damping;
         if (stiffness >= 1e5) {
           EXPECT_LE(beyond, 0.06) << stiffness << ' ' << damping;
         }
       }
-      // it has not stopped before
-      EXPECT_LE(falling.body("A").pose.position.y(), -0.3 + 1e-6) << stiffness << ' ' << damping;
+      // nothing has slowed it before
+      EXPECT_LE(lowest, -0.3 + 1e-6) << stiffness << ' ' << damping;
     }
 }
 
