@@ -71,7 +71,8 @@ double ConeProblem::make_consistent(const SolverBodies& bodies, double smallest)
   double largest = 0.0;
   for (const std::uint32_t r : held_) largest = std::max(largest, way_of(r));
   const double distance = largest * make_consistent(bodies, &side_);
-  return distance > std::max(smallest, 1e-9 * size()) ? distance : 0.0;
+  // what gives way counts whole on both sides
+  return distance > std::max(smallest, 1e-9 * size(nullptr)) ? distance : 0.0;
 }
 
 // Where many rows depend on each other equal springs tell the nearest side; the factors, what lies where their dependence and
@@ -122,7 +123,7 @@ void ConeProblem::share_out(const SolverBodies& bodies) {
 void ConeProblem::refine(const SolverBodies& bodies, const BodyMotion& x0, double smallest,
                          const ConeSettings& settings, ConeSummary* summary) {
   if (held_.empty()) return;
-  const double tolerance = std::max(smallest, settings.tolerance * size());
+  const double tolerance = std::max(smallest, settings.tolerance * size(&bodies));
   // what a row's own multiplier does to it is what rounding goes by
   const auto summed = [&] {
     double most = 0.0;

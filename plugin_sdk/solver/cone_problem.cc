@@ -221,10 +221,16 @@ void ConeProblem::find_values(const BodyMotion& x, Eigen::VectorXd* y) const {
   }
 }
 
-// The largest of what meets in a row, and is asked of one; m/s, m.
-double ConeProblem::size() const {
+// The largest of what meets in a row, and is asked of one; m/s, m. What a spring asks for, its error over the step, is without
+// end the shorter the step: of that what reaches the bodies counts, where these are told.
+double ConeProblem::size(const SolverBodies* bodies) const {
   double size = motion_;
-  for (const std::uint32_t r : held_) size = std::max(size, std::fabs(rows[r].law.lower_target) * rows[r].length);
+  for (const std::uint32_t r : held_) {
+    const JointLaw& law = rows[r].law;
+    const bool is_shared = bodies != nullptr && law.gamma > 0.0;
+    const double share = is_shared ? law.share_of_bodies(coupling(rows[r], rows[r], *bodies)) : 1.0;
+    size = std::max(size, share * std::fabs(law.lower_target) * rows[r].length);
+  }
   return size;
 }
 
@@ -239,7 +245,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
   order_held(bodies);
   factorise(bodies);
   summary.contradiction = make_consistent(bodies, smallest);
-  const double tolerance = std::max(smallest, settings.tolerance * size());
+  const double tolerance = std::max(smallest, settings.tolerance * size(&bodies));
   lambda_.resize(static_cast<Eigen::Index>(other_.size()));
   for (std::size_t o = 0; o < other_.size(); ++o)
     lambda_[static_cast<Eigen::Index>(o)] = rows[other_[o]].multiplier * scale_[other_[o]];

@@ -213,7 +213,7 @@ class ConeProblem {
   // Puts the held rows in the order of elimination_order.h.
   void order_held(const SolverBodies& bodies);
   void factorise(const SolverBodies& bodies);
-  double size() const;
+  double size(const SolverBodies* bodies) const;
   // The side of the held rows; as reconcile().
   double make_consistent(const SolverBodies& bodies, double smallest);
   // As ProfileLdlt::make_consistent().
