@@ -6,6 +6,9 @@
 // velocities that the attempts foretell as much as the jump makes in their time, and the shorter the less. What a smooth motion
 // misses, since its changes are no polynomial of the step, is prod(1 - s/h) of the attempts' steps h in a step s: the shorter
 // the more; and so is what closes a gap of rounding. Trials so short that a gap within the accuracy stays open tell nothing.
+//
+// A jump in the last inner step of every attempt is in the first one of the coarsest, which is the whole part. What the attempts
+// foretell of no time at all is then not nought, but would be without the coarsest; nor do trials find that much to put right.
 #include <algorithm>
 #include <cmath>
 
@@ -19,7 +22,15 @@ constexpr double kSeen = 0.1;     // of the accuracy: seven eighths of an eighth
 constexpr double kOfError = 2.0;  // that the extrapolation leaves
 constexpr double kRounding = 1e-12;       // m/s or rad/s
 constexpr double kShortestTrial = 1e-10;  // of the part
-constexpr double kUncertain = 0.25;       // share of what a smooth motion misses
+constexpr double kUncertain = 0.25;       // share of what a smooth motion, or the coarsest attempt, misses
+
+// rad/m: by how much a turn puts a slip right. Points of a shape are within its reach; without one joints hold, at any arm: one
+// where the push turns the body as much as it moves it takes most.
+double turn_of_slip(const Model& model, std::uint32_t body) {
+  if (model.bound[body].reach > 0.0) return 1.0 / model.bound[body].reach;
+  const double mass = model.inverse_mass[body], most = vector_at(model.inverse_inertia.span(), body).maxCoeff();
+  return mass > 0.0 ? 0.5 * std::sqrt(most / mass) : 0.0;
+}
 
 }  // namespace
 
@@ -37,8 +48,7 @@ void Environment::find_changes(std::vector<double>* changes) {
     for (std::size_t k = 0; k < to.size(); ++k) {
       const auto body = static_cast<std::uint32_t>(k / 3);
       changes->push_back(is_awake(body) ? to[k] - from[k] : 0.0);
-      scales_.push_back(
-          std::max({1.0, vector_at(from.span(), body).norm(), turns ? 1.0 / model_.bound[body].reach : 0.0}));
+      scales_.push_back(std::max({1.0, vector_at(from.span(), body).norm(), turns ? turn_of_slip(model_, body) : 0.0}));
     }
   };
   add(start_linear_velocity(), states_[back_].linear_velocity, false);
@@ -74,15 +84,15 @@ bool Environment::lets_go() const {
 bool Environment::hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error) {
   const std::size_t front = front_, back = back_;
   const double fine_step = length / pieces;
-  const auto foretold = [&](std::size_t k, double step) {
-    // Aitken and Neville's; what the start misses of its laws within the accuracy is put right in any step
+  const auto foretold = [&](std::size_t k, double step, std::uint32_t from) {
+    // Aitken and Neville's, of the attempts `from` on; what the start misses of its laws within the accuracy is put right in any step
     double changes[kMostPieces];
-    for (std::uint32_t n = first; n <= pieces; ++n) {
+    for (std::uint32_t n = from; n <= pieces; ++n) {
       changes[n - 1] = first_changes_[n - 1][k];
-      for (std::uint32_t m = n - 1; m >= first; --m)
+      for (std::uint32_t m = n - 1; m >= from; --m)
         changes[m - 1] = changes[m] + (changes[m] - changes[m - 1]) * (step * n - length) / (length - length * n / m);
     }
-    return changes[first - 1];
+    return changes[from - 1];
   };
   const auto of_smooth = [&](double step) {
     double product = 1.0;
@@ -102,14 +112,19 @@ bool Environment::hides_jump(double begin, double length, std::uint32_t first, s
     const double kept = of_smooth(step * kShorterTrial) / of_smooth(step);
     largest = 0.0;
     for (std::size_t k = 0; k < trial_changes_.size(); ++k) {
-      const double expected = foretold(k, step), missed = trial_changes_[k] - expected;
-      largest = std::max({largest, std::fabs(trial_changes_[k]), std::fabs(expected)});
+      const double expected = foretold(k, step, first), missed = trial_changes_[k] - expected;
+      largest = std::max({largest, std::fabs(trial_changes_[k]), std::fabs(expected - foretold(k, 0.0, first))});
       const double of_jump = missed_[k] - kept * missed;
       if (!is_first && std::fabs(of_jump) > std::max(allowed, kUncertain * std::fabs(missed)) &&
           std::fabs(missed_[k]) > std::fabs(missed))
         return true;
       missed_[k] = missed;
     }
+  }
+  if (pieces < first + 2) return false;
+  for (std::size_t k = 0; k < trial_changes_.size(); ++k) {
+    const double of_no_time = std::fabs(foretold(k, 0.0, first)), of_finer = std::fabs(foretold(k, 0.0, first + 1));
+    if (of_no_time > allowed && std::max(of_finer, std::fabs(trial_changes_[k])) < kUncertain * of_no_time) return true;
   }
   return false;
 }
