@@ -240,6 +240,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   void meet_stops(double begin, double length);
   double next_stop(const Trusted<TrialState>& trial, double begin, double length, double* crossing);
   void find_stops(bool of_trial, std::vector<StopGap>* stops) const;
+  void note_what_joints_bear();                          // openings.cc
+  double length_of_flight(double begin, double length);  // of a stop that opens and is pressed again
   // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
   std::uint64_t most_reaction_blocks() const;
 
@@ -402,8 +404,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities
   std::vector<double> start_gaps_, trial_gaps_;                                       // of limits
   std::vector<StopGap> first_stops_, start_stops_, end_stops_, trial_stops_;
-  std::vector<double> borne_;          // N, by joints in the derivatives of S* (Smooth)
-  std::vector<double> start_impulse_;  // N s, of joints, where the step begins (Smooth)
+  std::vector<double> borne_, least_borne_;  // N, by joints in the last, and of all derivatives of S* (Smooth)
+  std::vector<double> start_impulse_;        // N s, of joints, where the step begins (Smooth)
   std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;  // pairs
   double margin_ = 0.0;
 
@@ -423,14 +425,12 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::vector<std::vector<ColumnId>> discrepancy_reply_;  // per constraint group
 
   // Known once the forces have been asked at the start.
-  bool wrench_is_constant_ = true;
-  bool has_impulses_ = false;
+  bool wrench_is_constant_ = true, has_impulses_ = false;
   bool is_anew_ = true;         // no step yet, or none since an edit
   double start_overlap_ = 0.0;  // m, where such a step begins
-  bool start_wrench_known_ = false;
+  bool start_wrench_known_ = false, attempt_counts_ = true;
   enum class LastJoints { kNone, kFresh, kHeld } last_joints_ = LastJoints::kNone;  // in discrepancies, held_joints
-  bool attempt_counts_ = true;
-  std::vector<std::size_t> next_in_group_;  // scratch of merge_discrepancies()
+  std::vector<std::size_t> next_in_group_, pressed_stops_;  // scratch of merge_discrepancies(), length_of_flight()
 
   CommitFigures figures_;
   Hash state_hash_, chain_hash_;

@@ -87,7 +87,7 @@ void Environment::begin_attempt(bool counts) {
   validator_.begin_integration();
   if (!counts) return;
   start_wrench_known_ = false;
-  pushed_.clear();
+  pushed_.clear(), least_borne_.clear();
 }
 
 void Environment::evaluate() {

@@ -24,6 +24,10 @@ bool StopGap::may_have_closed(double time) const {
   return exists() && (gap < 0.0 || (rate > 0.0 && gap < kBend * rate * time));
 }
 
+bool StopGap::is_pressed_again(const StopGap& from, bool bears) const {
+  return from.exists() && !from.is_open() && (gap < -slop || (bears && gap > slop && rate > still));
+}
+
 std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const StopBody& body1,
                                            const StopBody& body2) {
   std::array<StopGap, kStopsOfRow> stops;

@@ -23,6 +23,8 @@ struct StopGap {
   bool exists() const { return gap < kUnlimited; }
   // Bears nothing from here on: it is away, or goes away.
   bool is_open() const { return exists() && (gap > slop || (rate > still && !gives_way)); }
+  // Of one that bore where the way here began, and was let go of since: it has come back beyond itself, or bears on its way off.
+  bool is_pressed_again(const StopGap& from, bool bears) const;
   // May have closed in a time that ends here, as far as this state alone tells.
   bool may_have_closed(double time) const;
 };

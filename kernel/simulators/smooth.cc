@@ -45,7 +45,7 @@ void Environment::ask_reactions() {
       [&](const auto& answer) { return validator_.reactions(answer); });
   last_joints_ = LastJoints::kFresh;  // joint_impulses.cc
   data_.held_position.assign(data_.derivative_position), data_.held_orientation.assign(data_.derivative_orientation);
-  if (attempt_counts_) data_.held_force.assign(data_.discrepancy_force);
+  if (attempt_counts_) note_what_joints_bear();
   std::ranges::transform(data_.wrench.span(), data_.reaction.span(), data_.wrench_with_reactions.data(), std::plus());
   if (!wants_jacobian()) return;
   const auto with_forces = request(data_.jacobian_body, data_.jacobian);

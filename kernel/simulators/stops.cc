@@ -3,9 +3,9 @@
 // trials pass them. An inner step ends just before, the next just behind, short enough that what acts in it is nothing;
 // its solve is the impact. So motion keeps the integrator's order between stops, and what bounces, its energy.
 //
-// A stop that opens needs no end: its force is zero there, and the derivatives let go of it. Flights from one stop back to it
-// that are shorter than kShortestHop of the step are none: the stop is at rest (the solver has nothing arrive that left
-// it in the same inner step). After kMostMeetings the rest of the step is Basic's.
+// A stop that opens needs no end, unless it is pressed again within the inner step (openings.cc): its force is zero there, and
+// the derivatives let go of it. Flights from one stop back to it that are shorter than kShortestHop of the step are none: the
+// stop is at rest (the solver has nothing arrive that left it in the same inner step). After kMostMeetings the rest of the step is Basic's.
 #include <algorithm>
 #include <cmath>
 
@@ -81,6 +81,7 @@ double Environment::next_stop(const Trusted<TrialState>& trial, double begin, do
   find_stops(false, &start_stops_);
   if (start_stops_.size() != end_stops_.size()) return length;
   first_stops_ = start_stops_;
+  length = length_of_flight(begin, length);
   // gaps count from where an open stop is: what leaves one that it is beyond by rounding has not closed it
   const auto count = [&](std::vector<StopGap>* stops) {
     for (std::size_t k = 0; k < stops->size(); ++k)

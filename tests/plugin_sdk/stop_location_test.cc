@@ -102,6 +102,19 @@ TEST(StopGap, MayHaveClosedIfItIsBeyondOrComesBack) {
   EXPECT_FALSE(StopGap{}.may_have_closed(1.0));
 }
 
+TEST(StopGap, IsPressedAgainBeyondItselfOrOnItsWayOff) {
+  const StopGap bore = gap(1e-10, 0.0), was_open = gap(1e-3, -1.0);
+  for (const bool bears : {false, true}) {
+    EXPECT_TRUE(gap(-1e-6, -1.0).is_pressed_again(bore, bears));
+    EXPECT_TRUE(gap(-1e-6, 1.0).is_pressed_again(bore, bears));
+    EXPECT_FALSE(gap(-1e-9, -1.0).is_pressed_again(bore, bears));
+    EXPECT_EQ(gap(1e-3, 1.0).is_pressed_again(bore, bears), bears);
+    EXPECT_FALSE(gap(1e-3, -1.0).is_pressed_again(bore, bears));
+    EXPECT_FALSE(gap(-1e-6, -1.0).is_pressed_again(was_open, bears));  // this is a closing
+    EXPECT_FALSE(gap(-1e-6, -1.0).is_pressed_again(StopGap{}, bears));
+  }
+}
+
 // A cubic tells motions under constant loads exactly.
 TEST(ClosingTime, OfAFallIsThatOfTheParabola) {
   constexpr double kHeight = 0.3, kSpeed = -0.2, kLoad = 4.0;

@@ -560,7 +560,7 @@ TEST(IrregularCone, IsKept) {
 }
 
 // Stops take energy and pivots do no work. What a stop let go of was pushed again within the step, open and on its way, so that
-// it was given up to 13 times the energy.
+// it was given up to 13 times the energy; near the stop, up to 0.5 % in a step.
 TEST(ChainOfCones, GainsNoEnergyWithSmooth) {
   struct Chain {
     int links;
@@ -570,7 +570,7 @@ TEST(ChainOfCones, GainsNoEnergyWithSmooth) {
   };
   const Vector3 rod(8e-5, 7.5e-4, 7.5e-4), ball = Vector3::Constant(7e-4);
   for (const Chain& chain : {Chain{4, "ReachConeAngle = 0.2", 7.0, ball}, Chain{6, "ReachConeAngle = 0.1", 5.0, rod},
-                             Chain{8, "ReachConeAngle = 0.2", 5.0, rod}})
+                             Chain{6, "ReachConeAngle = 0.1", 7.0, rod}, Chain{8, "ReachConeAngle = 0.2", 5.0, rod}})
     for (const std::string solver : {"Newton", "Direct"}) {
       SceneRun run(whip(chain.links, chain.cone, chain.speed, chain.moments),
                    {set("Simulator", "Smooth"), set("Simulator.TimeStep", 1.0 / 240.0), set("Solver", solver)});

@@ -1,0 +1,72 @@
+// Stops of joints that open within an inner step of `Smooth`, and are pressed again within it.
+//
+// Reactions go by what was closed where an inner step begins. What a stop let go of and comes back to it within the same inner
+// step goes on into it, and would be put out of it at the end, against whatever presses there; and what presses while it flies off,
+// near the stop, is held off, as if it still stood there. A stiff spring, or a chain that whips, would be given energy. So such an
+// inner step ends in the flight, where the stop is open for the next one, which meets it in its turn (stops.cc).
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "kernel/environment.h"
+
+namespace gravitas::kernel {
+namespace {
+
+constexpr int kMostFlightLooks = 24;
+constexpr double kFlightShare = 1.0 / 64;  // of the length, to which it is known where the flight begins
+
+}  // namespace
+
+void Environment::note_what_joints_bear() {
+  data_.held_force.assign(data_.discrepancy_force);
+  const bool is_first = least_borne_.size() != data_.held_force.size();
+  if (is_first) least_borne_.resize(data_.held_force.size());
+  for (std::size_t i = 0; i < least_borne_.size(); ++i) {
+    const double borne = std::abs(data_.held_force[i]);
+    least_borne_[i] = is_first ? borne : std::min(least_borne_[i], borne);
+  }
+}
+
+// Where stops are pressed again in S*: how long an inner step is that ends while they are open. In end_stops_ are the stops where it
+// ends, before and after.
+double Environment::length_of_flight(double begin, double length) {
+  const auto has_let_go = [&](std::size_t k) { return k / 2 < least_borne_.size() && least_borne_[k / 2] == 0.0; };
+  const auto is_pressed_again = [&](const std::vector<StopGap>& stops, std::size_t k) {
+    return has_let_go(k) && stops[k].is_pressed_again(first_stops_[k], data_.held_force[k / 2] != 0.0);
+  };
+  pressed_stops_.clear();
+  for (std::size_t k = 0; k < end_stops_.size(); ++k)
+    if (is_pressed_again(end_stops_, k)) pressed_stops_.push_back(k);
+  if (pressed_stops_.empty()) return length;
+  double closed = 0.0, open = 0.0, pressed = length;
+  for (int i = 0; i < kMostFlightLooks && (open == 0.0 || open - closed > kFlightShare * length); ++i) {
+    const double middle = 0.5 * (closed + (open > 0.0 ? open : pressed));
+    begin_inner_step(begin, middle);
+    constrain(integrate());
+    find_stops(true, &trial_stops_);
+    if (trial_stops_.size() != first_stops_.size()) return length;
+    bool flies = false, is_pressed = false;
+    for (std::size_t k = 0; k < trial_stops_.size(); ++k) {
+      is_pressed = is_pressed || is_pressed_again(trial_stops_, k);
+      flies = flies || (has_let_go(k) && trial_stops_[k].is_open() &&
+                        std::ranges::find(pressed_stops_, k) != pressed_stops_.end());
+    }
+    if (is_pressed) {
+      pressed = middle, open = 0.0;
+      pressed_stops_.clear();
+      for (std::size_t k = 0; k < trial_stops_.size(); ++k)
+        if (is_pressed_again(trial_stops_, k)) pressed_stops_.push_back(k);
+    } else {
+      (flies ? open : closed) = middle;
+    }
+  }
+  const double end = open > 0.0 ? open : pressed;
+  begin_inner_step(begin, end);
+  constrain(integrate());
+  find_stops(true, &end_stops_);
+  return end;
+}
+
+}  // namespace gravitas::kernel
