@@ -25,7 +25,7 @@ bool StopGap::may_have_closed(double time) const {
 }
 
 bool StopGap::is_pressed_again(const StopGap& from, bool bears) const {
-  return from.exists() && !from.is_open() && (gap < -slop || (bears && gap > slop && rate > still));
+  return from.exists() && !gives_way && !from.is_open() && (gap < -slop || (bears && gap > slop && rate > still));
 }
 
 std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const StopBody& body1,
