@@ -115,8 +115,10 @@ template <typename Bodies, typename Progress>
 Ending solve(const Bodies& bodies, std::uint32_t most_sweeps, Problem* problem, BodyMotion* x, Progress&& progress) {
   constexpr double kRounding = 1e-14;
   Ending ending;
+  // of what the rows begin with, speeds of the warm start among them: it may have to be taken back whole
   double size = 0.0;
   for (const Row& row : problem->rows) {
+    size = std::max(size, std::fabs(row.multiplier) * row.response);
     size = std::max(size, row.direction.size_along((*x)[row.body1], (*x)[row.body2]));
     if (row.law.has_lower) size = std::max(size, std::fabs(row.law.lower_target));
     if (row.law.has_upper) size = std::max(size, std::fabs(row.law.upper_target));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "known_result.h"
@@ -36,12 +37,31 @@ Vector3 met(const Vector3& velocity, double friction) {
   return x[0].linear;
 }
 
+// Two loads, one on the other, whose weight has just gone: sweeps halve what the warm start gives, until only rounding is left.
+void take_weight_away() {
+  std::vector<gravitas::SolverBody> bodies(3);
+  bodies[0].inverse_mass = bodies[2].inverse_mass = 1.0;
+  plain::Problem problem;
+  for (const std::uint32_t lower : {1U, 0U}) {
+    plain::Row row = row_along(Vector3::UnitY());
+    row.body1 = lower, row.body2 = lower == 1 ? 0 : 2;
+    row.law.has_lower = true;
+    row.multiplier = 1.0;
+    expect(problem.add(row, bodies), "the row pushes a body");
+  }
+  gravitas::BodyMotion x(3);
+  expect(plain::solve(bodies, 60, &problem, &x, [] {}).converged, "it converges where nothing moved before");
+  expect_near("the lower load", x[0].linear, Vector3::Zero(), 1e-13);
+  expect_near("the upper load", x[2].linear, Vector3::Zero(), 1e-13);
+}
+
 }  // namespace
 
 int main(int, char** arguments) {
   expect_near("what leaves the wall", met({1, 3, 2}, 0.5), Vector3(1, 3, 2), 0.0);
   expect_near("what runs into it and slides", met({3, -2, 4}, 0.5), Vector3(2.4, 0, 3.2), 1e-13);
   expect_near("what runs into it and sticks", met({3, -20, 4}, 0.5), Vector3::Zero(), 1e-13);
+  take_weight_away();
 
   // the scene, h = 0.01 s, g = 10 m/s^2; tolerances: where sweeps end
   const auto samples = [&](const char* body) {
