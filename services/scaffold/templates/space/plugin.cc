@@ -8,6 +8,7 @@
 #include "plugin_sdk/plugin.h"
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -46,12 +47,14 @@ class MyNamePlugin final : public SpacePlugin {
       if (is_pair.has_shape(body) && !std::isnan(lower) && !std::isnan(upper))
         intervals_.push_back({lower, upper, body});
     }
-    // prolongs the deadline of the call where there is much to do
-    host.mark_progress();
     found_.clear();
+    std::size_t met = 0;
     plain::sweep(&intervals_, [&](std::uint32_t a, std::uint32_t b) {
+      // prolongs the deadline of the call where there is much to do
+      if (met++ % 1024 == 0) host.mark_progress();
       if (is_pair(a, b)) found_.add(a, b);
     });
+    host.mark_progress();
     found_.sort(is_pair.bodies());
     found_.write(reply.pair());
   }
