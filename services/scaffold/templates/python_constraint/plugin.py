@@ -40,9 +40,12 @@ def length(v):
 
 def frame_along(n):
     """A quaternion whose first axis is a unit vector: the shortest turn from x to it, which against x has no axis of its own."""
-    if n[0] < 0.0 and n[1] == 0.0 and n[2] == 0.0:
+    across = n[1] * n[1] + n[2] * n[2]
+    if n[0] < 0.0 and across < 1e-300:
         return numpy.array([0.0, 0.0, 1.0, 0.0])
-    return normalized(numpy.array([1.0 + n[0], 0.0, -n[2], n[1]]))
+    # the same number of a unit vector, but 1 + n[0] cancels near -x
+    w = across / (1.0 - n[0]) if n[0] < 0.0 else 1.0 + n[0]
+    return normalized(numpy.array([w, 0.0, -n[2], n[1]]))
 
 
 def normalized(q):
@@ -54,7 +57,7 @@ def projection(origin, normal, point):
     return point - (normal[0] * way[0] + normal[1] * way[1] + normal[2] * way[2]) * normal
 
 
-class MyName(Constraint):
+class MyNamePlugin(Constraint):
     # What a scene may write in the CustomProperties of such a joint; Body1 and Body2 stand beside them. Parsing, checking and
     # `gravitas describe` come from here. More kinds of properties: gravitas_worker/declaration.py.
     name = "MyName"
@@ -138,4 +141,4 @@ class MyName(Constraint):
 
 
 if __name__ == "__main__":
-    main(MyName)
+    main(MyNamePlugin)
