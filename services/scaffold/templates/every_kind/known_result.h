@@ -14,10 +14,11 @@ namespace known_result {
 using gravitas::Vector3;
 
 struct Sample {
-  double time = 0.0;                 // s
-  Vector3 position, velocity;        // of the geometry's frame, m; of the centre of mass, m/s
-  gravitas::Quaternion orientation;  // body to world
-  Vector3 angular_velocity;          // rad/s, world
+  double time = 0.0;                                                            // s
+  Vector3 position = Vector3::Zero();                                           // of the geometry's frame, m
+  Vector3 velocity = Vector3::Zero();                                           // of the centre of mass, m/s
+  gravitas::Quaternion orientation = gravitas::Quaternion(1.0, 0.0, 0.0, 0.0);  // body to world
+  Vector3 angular_velocity = Vector3::Zero();                                   // rad/s, world
 };
 
 // The samples of a body, none where there is no file, in that of `gravitas run --trajectory`: a header, then

@@ -1,6 +1,7 @@
 // What the integrator is known to do: half a step by itself, and the motion that my_name.gravitas comes to.
 #include "my_name.h"
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -25,7 +26,23 @@ int main(int, char** arguments) {
     expect_near("position", oscillator[n].position, Vector3(std::cos(static_cast<double>(n) * phi), 0, 0), 1e-11);
 
   // a body thrown up at 5 m/s under 10 m/s^2: the parabola, exactly
-  for (const Sample& sample : samples_of("Thrown", arguments[1]))
+  const std::vector<Sample> thrown = samples_of("Thrown", arguments[1]);
+  expect(thrown.size() == 201, "all of its samples");
+  for (const Sample& sample : thrown)
     expect_near("height", sample.position.y(), 5.0 * sample.time - 5.0 * sample.time * sample.time, 1e-11);
+
+  // a free top with the moments (1, 1, 2) kg m^2 that turns with (1, 0, 2) rad/s: its axis z goes about the angular momentum L,
+  // (1, 0, 4) N m s, with L/(1 kg m^2), while it turns about that axis with (1 - 2/1) 2 rad/s
+  const Vector3 momentum(1, 0, 4);
+  const std::vector<Sample> spinning = samples_of("Spinning", arguments[1]);
+  expect(spinning.size() == 201, "all of its samples");
+  for (const Sample& sample : spinning) {
+    const gravitas::Quaternion precession(
+        Eigen::AngleAxisd(momentum.norm() * sample.time, Vector3(momentum.normalized())));
+    const gravitas::Quaternion attitude = precession * Eigen::AngleAxisd(-2.0 * sample.time, Vector3::UnitZ());
+    expect_near("its axis x", sample.orientation * Vector3::UnitX(), attitude * Vector3::UnitX(), 1e-11);
+    expect_near("its axis z", sample.orientation * Vector3::UnitZ(), attitude * Vector3::UnitZ(), 1e-11);
+    expect_near("angular velocity", sample.angular_velocity, precession * Vector3(1, 0, 2), 1e-11);
+  }
   return failures == 0 ? 0 : 1;
 }

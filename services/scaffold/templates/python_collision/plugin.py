@@ -45,7 +45,7 @@ def touch_of_halfspace(surface, normal, centre, radius):
     return centre - (radius - 0.5 * depth) * normal, normal, depth
 
 
-class MyName(Collision):
+class MyNamePlugin(Collision):
     # Shapes as the scene language has them; a scene with others is refused by their names. Times of impact, rays and outlines
     # are capabilities, and methods, of their own.
     name = "MyName"
@@ -121,4 +121,4 @@ class MyName(Collision):
 
 
 if __name__ == "__main__":
-    main(MyName)
+    main(MyNamePlugin)

@@ -24,15 +24,16 @@ def gravitas(*words):
 
 
 def motions(scene):
-    """Of each body by its id: (time, position, velocity) at the start and after every step."""
+    """Of each body by its id: (time, position, velocity, attitude, angular velocity) at the start and after every step."""
     samples = {}
     with tempfile.TemporaryDirectory() as folder:
         file = os.path.join(folder, "motion.csv")
         gravitas("run", scene, "--trajectory", file, "--quiet")
         with open(file) as rows:
             for row in csv.DictReader(rows):
-                vectors = [numpy.array([float(row[name + axis]) for axis in "xyz"]) for name in "pv"]
-                samples.setdefault(row["body"], []).append((float(row["time"]), *vectors))
+                x, v, q, w = (numpy.array([float(row[name + axis]) for axis in axes])
+                              for name, axes in (("p", "xyz"), ("v", "xyz"), ("q", "wxyz"), ("w", "xyz")))
+                samples.setdefault(row["body"], []).append((float(row["time"]), x, v, q, w))
     return samples
 
 

@@ -21,7 +21,7 @@ class KnownResults(unittest.TestCase):
         samples = motions("my_name.gravitas")["Leaf"]
         self.assertEqual(len(samples), 101)
         v, x = numpy.zeros(3), numpy.zeros(3)
-        for _, position, velocity in samples[1:]:
+        for _, position, velocity, *_ in samples[1:]:
             v = v + 0.01 * 1.0 / 2.0 * (WIND - v)
             x = x + 0.01 * v
             # rounding of a hundred steps

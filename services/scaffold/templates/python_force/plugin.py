@@ -20,7 +20,7 @@ def wind_force(coefficient, wind, velocity):
     return coefficient * (wind - velocity)
 
 
-class MyName(Force):
+class MyNamePlugin(Force):
     # What a scene may write. Parsing, checking, defaults and `gravitas describe` come from here, so a property has its unit,
     # its bounds and a sentence. More kinds of properties: gravitas_worker/declaration.py.
     name = "MyName"
@@ -51,4 +51,4 @@ class MyName(Force):
 
 
 if __name__ == "__main__":
-    main(MyName)
+    main(MyNamePlugin)

@@ -44,7 +44,7 @@ def turned_by(q, way):
     return numpy.where(angle > 0.0, turned / size, q)
 
 
-class MyName(Integrator):
+class MyNamePlugin(Integrator):
     # Settings would be `properties`, whose values __init__ gets.
     name = "MyName"
     version = "1.0"
@@ -88,4 +88,4 @@ class MyName(Integrator):
 
 
 if __name__ == "__main__":
-    main(MyName)
+    main(MyNamePlugin)

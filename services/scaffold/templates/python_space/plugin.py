@@ -17,7 +17,7 @@ def partners(lower, upper, a):
     return a + 1 + numpy.flatnonzero(is_near)
 
 
-class MyName(Space):
+class MyNamePlugin(Space):
     # Rays and outlines are capabilities, and methods, of their own; settings would be `properties`, which __init__ gets.
     name = "MyName"
     version = "1.0"
@@ -41,4 +41,4 @@ class MyName(Space):
 
 
 if __name__ == "__main__":
-    main(MyName)
+    main(MyNamePlugin)
