@@ -1,5 +1,6 @@
-# How a plugin that lies outside of this tree becomes a library, with the compiler and the flags of a build of this tree.
-# Included by its CMakeLists.txt before project(), so that the compiler can be chosen:
+# How a plugin that lies outside of this tree becomes a library, with the numeric options of this tree, and with the compiler of
+# a build of it unless CMAKE_CXX_COMPILER or CXX name another. CMAKE_CXX_FLAGS and the build type of that build are not taken
+# over; one with sanitizers is refused. Included by its CMakeLists.txt before project(), so that the compiler can be chosen:
 #
 #   set(GRAVITAS_BUILD …)               the build; <this tree>/build/release if empty
 #   include(<this tree>/plugin_sdk/out_of_tree.cmake)
@@ -14,6 +15,8 @@ cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH GRAVITAS_TREE)
 if(NOT GRAVITAS_BUILD)
   set(GRAVITAS_BUILD ${GRAVITAS_TREE}/build/release)
 endif()
+# what is linked is looked for in other folders than this file
+get_filename_component(GRAVITAS_BUILD "${GRAVITAS_BUILD}" ABSOLUTE)
 set(GRAVITAS_PROGRAM ${GRAVITAS_BUILD}/bin/gravitas)
 foreach(needed IN ITEMS CMakeCache.txt bin/gravitas bin/gravitas-worker archives/libgravitas_sdk.a
     generated/schemas/stage_frames.h)
@@ -22,6 +25,13 @@ foreach(needed IN ITEMS CMakeCache.txt bin/gravitas bin/gravitas-worker archives
       "${GRAVITAS_TREE}/deploy/build_preset release runtime, or another build with -DGRAVITAS_BUILD=<folder>")
   endif()
 endforeach()
+
+file(STRINGS ${GRAVITAS_BUILD}/CMakeCache.txt sanitizers REGEX "^GRAVITAS_SANITIZERS:[^=]*=.")
+if(sanitizers)
+  string(REGEX REPLACE "^[^=]*=" "" sanitizers "${sanitizers}")
+  message(FATAL_ERROR "Gravitas was built with sanitizers (${sanitizers}) in '${GRAVITAS_BUILD}'; required: "
+    "a build without, such as -DGRAVITAS_BUILD=${GRAVITAS_TREE}/build/release")
+endif()
 
 if(NOT CMAKE_CXX_COMPILER AND NOT DEFINED ENV{CXX})
   file(STRINGS ${GRAVITAS_BUILD}/CMakeCache.txt compiler REGEX "^CMAKE_CXX_COMPILER:")

@@ -46,7 +46,7 @@ void add_new(CLI::App* app, Action* action) {
       "         gravitas new force MyWind --language python\n"
       "What is written is a small plugin that works, commented as a tutorial, with a scene that uses it, a test of "
       "both, and "
-      "a README with the commands to build, check, run, replay, debug and swap it.");
+      "a README with the commands to build, check, run, replay, debug and compare it, in C++ also to swap it.");
   command->add_option("KIND", options->kind, "space, collision, constraint, force, solver or integrator")->required();
   command
       ->add_option("NAME", options->name,

@@ -96,6 +96,8 @@ using Texts = std::map<std::string, std::string>;
 void add_templates(const fs::path& folder, const Words& words, Texts* texts) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
+    // what interpreters and editors leave
+    if (!entry.is_regular_file() || name.ends_with('~')) continue;
     // of these one becomes a part of the README
     if (name.starts_with("compare_")) continue;
     // under its own name it would hide files of the tree from git
@@ -128,7 +130,10 @@ void write_all(const fs::path& folder, const Texts& texts) {
       written.push_back(folder / name);
       file << text;
       file.close();
-      if (!file) throw std::system_error(errno, std::generic_category(), "'" + (folder / name).string() + "'");
+      if (!file)
+        throw BadInput(
+            fmt::format("gravitas new: '{}' cannot be written: {}; allowed: a folder that takes files (--out)",
+                        (folder / name).string(), std::generic_category().message(errno)));
     }
   } catch (...) {
     std::error_code ignored;
@@ -180,10 +185,8 @@ Project write_project(const ProjectOptions& options, const Catalog& installed) {
       {"@BUILD@", build.lexically_relative(tree).string()},
       {"@GRAVITAS_BUILD@", build.string()}};
   Texts texts;
-  if (!is_python) {
-    const char* const compare = kind.peer[0] != '\0' ? "compare_peer.md" : "compare_builds.md";
-    words["@COMPARE@"] = filled(text_of(shared / compare), words);
-  }
+  const char* const compare = kind.peer[0] != '\0' ? "compare_peer.md" : "compare_builds.md";
+  words["@COMPARE@"] = filled(text_of(shared / compare), words);
   add_templates(shared, words, &texts);
   add_templates(own, words, &texts);
   // the scene is the same in all languages

@@ -33,8 +33,8 @@ struct Project {
 std::string file_style(const std::string& name);
 
 // Writes the project, all of it or nothing. Throws BadInput for a kind, name, language or folder that cannot be: a name is
-// of letters, digits and '_', and none that a plugin or type of the catalogue has; a folder is empty, or not there. Throws
-// std::system_error where a file cannot be written.
+// of letters, digits and '_', and none that a plugin or type of the catalogue has; a folder is empty, or not there, and
+// takes files. Throws std::system_error where a template cannot be read.
 Project write_project(const ProjectOptions& options, const Catalog& installed);
 
 }  // namespace gravitas::scaffold

@@ -157,12 +157,11 @@ TEST_P(NewPythonProject, IsTestedAndUsedAsItsReadmeSays) {
   EXPECT_EQ(left.words, "");
 }
 
+// words of the language and names of the template's own are no harm
 INSTANTIATE_TEST_SUITE_P(Kinds, NewPythonProject,
-                         testing::Values(Scaffold{"space", "XSweep", "x_sweep"},
-                                         Scaffold{"collision", "BallsOnly", "balls_only"},
-                                         Scaffold{"constraint", "In_Plane", "in_plane"},
-                                         Scaffold{"force", "MyWind", "my_wind"},
-                                         Scaffold{"integrator", "Random", "random"}),
+                         testing::Values(Scaffold{"space", "numpy", "numpy"}, Scaffold{"collision", "Values", "values"},
+                                         Scaffold{"constraint", "None", "none"}, Scaffold{"force", "main", "main"},
+                                         Scaffold{"integrator", "class", "class"}),
                          kind_of);
 
 // A checkout that is none, or that is not built, is named with what is required.
@@ -176,6 +175,46 @@ TEST(NewProjectBuild, SaysWhatIsMissing) {
   const ScriptResult no_build = run_script(project, "cmake -B other -G Ninja -DGRAVITAS_BUILD=/nowhere");
   EXPECT_NE(no_build.exit_code, 0);
   EXPECT_THAT(no_build.words, HasSubstr("Gravitas is not built in '/nowhere'"));
+}
+
+// A build is named as a shell names it, and one that nothing can be linked with is refused.
+TEST(NewProjectBuild, MayLieAnywhereButNotBeSanitized) {
+  const ScratchFolder folder;
+  ASSERT_EQ(run_program({"new", "force", "MyWind"}, folder).exit_code, 0);
+  const std::string project = folder.path("my_wind");
+  const std::string built = in_shell(in_build());
+  const ScriptResult relative = run_script(project, kWithCache + ("ln -s " + built +
+                                                                  " it\ncmake -B build -G Ninja -DGRAVITAS_BUILD=it\n"
+                                                                  "cmake --build build --target my_wind_test\n"));
+  EXPECT_EQ(relative.exit_code, 0) << relative.words;
+  EXPECT_THAT(relative.words, Not(HasSubstr("Warning")));
+  const ScriptResult sanitized =
+      run_script(project, "mkdir other && ln -s " + built +
+                              "/* other/ && rm other/CMakeCache.txt\n"
+                              "echo GRAVITAS_SANITIZERS:STRING=address >other/CMakeCache.txt\n"
+                              "cmake -B elsewhere -G Ninja -DGRAVITAS_BUILD=$PWD/other\n");
+  EXPECT_NE(sanitized.exit_code, 0);
+  EXPECT_THAT(sanitized.words, HasSubstr("sanitizers (address)"));
+}
+
+// Beside templates may lie what editors and interpreters leave: here in a tree of its own, with its own program.
+TEST(NewProjectTemplates, AreFilesAloneAndNoCopiesOfEditors) {
+  namespace fs = std::filesystem;
+  const ScratchFolder folder;
+  const fs::path tree = folder.path("tree"), templates = tree / "services/scaffold/templates";
+  fs::create_directories(tree / "build/bin");
+  fs::create_directories(tree / "build/lib/gravitas");
+  for (const char* program : {"gravitas", "gravitas-worker"})
+    fs::copy_file(in_build(std::string("/bin/") + program), tree / "build/bin" / program);
+  fs::create_directories(templates);
+  fs::copy(in_source("/services/scaffold/templates"), templates, fs::copy_options::recursive);
+  fs::create_directories(templates / "python_force/__pycache__");
+  fs::copy_file(templates / "python_force/plugin.py", templates / "python_force/plugin.py~");
+  const ScriptResult written =
+      run_script(tree, "build/bin/gravitas new force MyWind --language python && ls -xA -w 0 my_wind");
+  EXPECT_EQ(written.exit_code, 0) << written.words;
+  EXPECT_THAT(written.words,
+              HasSubstr(".gitignore  README.md  known_result.py  my_wind.gravitas  my_wind_test.py  plugin.py\n"));
 }
 
 TEST(NewProjectRefusal, NamesWhatIsAllowedAndLeavesNothing) {
@@ -230,8 +269,9 @@ TEST(NewProjectRefusal, WhatCannotBeWrittenIsTakenBackWhole) {
   place += '/' + std::string(kParent - place.size() - 1, 'e');
   std::filesystem::create_directories(place);
   const ProgramResult result = run_program({"new", "force", "MyWind", "--out", place + "/p"}, folder);
-  EXPECT_EQ(result.exit_code, 1) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("File name too long"));
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("gravitas new: '"));
+  EXPECT_THAT(result.err, HasSubstr("cannot be written: File name too long; allowed: "));
   EXPECT_TRUE(std::filesystem::is_empty(place));
 }
 
