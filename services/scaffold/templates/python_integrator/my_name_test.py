@@ -37,9 +37,9 @@ class KnownResults(unittest.TestCase):
             q, w = q[None], w[None]
             # rounding of two hundred steps
             expect_near(rotated(q, moments * turned_back(q, w)), momentum, 1e-12)
-            # attitudes are of order 1
+            # attitudes are of order 1: 0.019 after two seconds
             precession = turned_by(numpy.array([[1.0, 0, 0, 0]]), time * momentum)
-            expect_near(rotated(q, z), rotated(precession, z), 1e-1)
+            expect_near(rotated(q, z), rotated(precession, z), 0.03)
 
 
 if __name__ == "__main__":
