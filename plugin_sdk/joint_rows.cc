@@ -213,7 +213,7 @@ JointSpring on_swing(const JointSpring& spring, double sine, double swing) {
   const double told = math::asin(sine * math::sin(angle));
   // d angle/d swing
   const double slope = math::cos(told) / (sine * math::cos(angle));
-  const double stiffness = told > kSmall ? angle * slope / told : slope * slope;
+  const double stiffness = angle > kSmall ? angle * slope / told : slope * slope;
   return {stiffness * spring.stiffness, slope * slope * spring.damping};
 }
 

@@ -21,7 +21,7 @@ struct StopGap {
   bool gives_way = false;
 
   bool exists() const { return gap < kUnlimited; }
-  // Bears nothing from here on: it is away, or goes away.
+  // Bears nothing from here on: it is away, or goes away; one that gives way bears until it is away.
   bool is_open() const { return exists() && (gap > slop || (rate > still && !gives_way)); }
   // Of one that bore where the way here began, and was let go of since: it has come back beyond itself, or bears on its way off.
   bool is_pressed_again(const StopGap& from, bool bears) const;

@@ -1,6 +1,7 @@
 // `gravitas study`.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -109,7 +110,17 @@ std::vector<study::Demand> demands_of(const StudyLine& line) {
   if (line.gate.empty()) return line.options.rungs == 0 ? study::built_in_demands() : std::vector<study::Demand>();
   std::vector<std::string> problems;
   for (const std::string& scene : line.options.scenes) problems.push_back(study::problem_name(scene));
-  return study::read_demands(line.gate, problems, line.options.methods);
+  // a part of a name is no name; whole ones may be of plugins that scenes bring along
+  const Catalog installed = Catalog::installed(installed_worker(), installed_plugins());
+  std::vector<std::string> methods;
+  for (const std::string& word : line.options.methods) {
+    if (std::ranges::count(word, '/') >= 2) {
+      methods.push_back(word);
+      continue;
+    }
+    for (const study::Method& method : study::named_methods({word}, installed)) methods.push_back(method.name());
+  }
+  return study::read_demands(line.gate, problems, methods);
 }
 
 int run_study(StudyLine* line) {

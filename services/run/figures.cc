@@ -167,7 +167,10 @@ void Figures::find_overlaps(const kernel::InnerStep& inner) {
     const std::uint32_t one = data.contact_body[2 * i], two = data.contact_body[2 * i + 1];
     const Vector3 normal = vector_at(data.contact_normal.span(), i), point = vector_at(data.contact_point.span(), i);
     const Vector3 half = 0.5 * data.contact_depth[i] * normal;
-    const double depth = normal.dot(before(one, point + half) - before(two, point - half));
+    const Vector3 apart = before(one, point + half) - before(two, point - half);
+    const double depth = normal.dot(apart);
+    // points that have come from elsewhere tell nothing
+    if ((apart - depth * normal).norm() > depth) continue;
     if (!(depth > kOverlap * std::min(size(one), size(two)))) continue;
     if (one != last_one || two != last_two) ++pairs;
     last_one = one, last_two = two;

@@ -31,9 +31,9 @@ constexpr DemandWord kDemandWords[] = {{"error", Demand::What::kError, 1},
 const v1::Ladder* find_ladder(const v1::Study& study, const Demand& demand) {
   for (const v1::Problem& problem : study.problems())
     for (const v1::Ladder& ladder : problem.ladders())
-      // a ladder that somebody interrupted at once is none
+      // a ladder that somebody interrupted is none
       if (problem.name() == demand.problem && !(demand.is_of_shipped && problem.family() == "own") &&
-          ladder.method() == demand.method && ladder.rungs_size() > 0)
+          ladder.method() == demand.method && ladder.rungs_size() > 0 && !ladder.is_interrupted())
         return &ladder;
   return nullptr;
 }
@@ -46,7 +46,8 @@ std::string why_error_failed(const v1::Ladder& ladder, double largest) {
   double best = std::numeric_limits<double>::infinity();
   for (const v1::Rung& rung : ladder.rungs())
     if (rung.failed().empty()) best = std::min(best, rung.error());
-  if (best <= largest) return {};
+  // times are not gated
+  if (best <= largest || ran_out_of_time(ladder)) return {};
   return std::isinf(best) ? fmt::format("no rung comes to its end; at most {:g} is wanted", largest)
                           : fmt::format("its best error is {:.3g}; at most {:g} is wanted", best, largest);
 }
@@ -65,7 +66,7 @@ std::string why_evaluations_failed(const v1::Ladder& ladder, const Demand& deman
   double least = std::numeric_limits<double>::infinity();
   for (const v1::Rung& rung : ladder.rungs())
     if (rung.failed().empty() && rung.error() <= demand.low) least = std::min(least, evaluations(rung));
-  if (least <= demand.high) return {};
+  if (least <= demand.high || (std::isinf(least) && ran_out_of_time(ladder))) return {};
   return std::isinf(least) ? fmt::format("it does not reach an error of {:g}", demand.low)
                            : fmt::format("an error of {:g} takes {:.0f} evaluations; at most {:g} are wanted",
                                          demand.low, least, demand.high);
@@ -117,6 +118,8 @@ std::vector<Demand> read_demands(const std::string& path, std::vector<std::strin
                          known->numbers == 1 ? "" : "s"));
     (known->numbers == 1 ? demand.high : demand.low) = numbers[0];
     if (known->numbers == 2) demand.high = numbers[1];
+    if (demand.what == Demand::What::kOrder && demand.low > demand.high)
+      refuse(fmt::format("\"{}\": the lowest order is above the highest", line));
     // a slip would be demanded of nothing
     if (std::ranges::find(problems, demand.problem) == problems.end())
       refuse(fmt::format("problem \"{}\": {}", demand.problem, allowed_names(demand.problem, problems)));

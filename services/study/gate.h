@@ -36,8 +36,8 @@ std::vector<Demand> built_in_demands();
 std::vector<Demand> read_demands(const std::string& path, std::vector<std::string> problems,
                                  std::vector<std::string> methods);
 
-// Fills failures and demands of the study. What was not run is not looked at; an order is not missed by a ladder that came
-// to the end of its CPU before it could show one.
+// Fills failures and demands of the study. What was not run, or was interrupted, is not looked at; nothing is missed by a ladder
+// that came to the end of its CPU before it could show it.
 void apply_gate(const std::vector<Demand>& demands, v1::Study* study);
 
 }  // namespace gravitas::study

@@ -95,7 +95,8 @@ std::vector<Method> named_methods(const std::vector<std::string>& words, const C
       }
     if (is_known) continue;
     if (std::optional<Method> other = installed_method(word, installed)) {
-      others.push_back(std::move(*other));
+      const auto is_same = [&](const Method& one) { return one.name() == other->name(); };
+      if (std::ranges::none_of(others, is_same)) others.push_back(std::move(*other));
       continue;
     }
     std::vector<std::string> names;

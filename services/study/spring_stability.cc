@@ -284,7 +284,8 @@ double growth_of(const std::string& method, const SpringPath& moved, const Sprin
   return spectral_radius(next * inverse.pseudoInverse());
 }
 
-std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted) {
+std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted, bool* is_whole) {
+  *is_whole = false;
   Catalog installed = Catalog::installed(installed_worker(), installed_plugins());
   std::vector<v1::Limit> limits;
   for (const auto& [method, theory] : theories()) {
@@ -294,6 +295,7 @@ std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted) {
       limits.push_back(limit_of(method, zeta, &installed));
     }
   }
+  *is_whole = true;
   return limits;
 }
 

@@ -42,7 +42,7 @@ double growth_of(const std::string& method, const SpringPath& moved, const Sprin
                  double noise);
 
 // All installed integrators that have a theory, with zeta 0, 0.1, 1 and 10, each on k h^2 from 1e-2 to 1e6. Throws BadInput.
-// `interrupted` is asked between methods; then what there is.
-std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted);
+// `interrupted` is asked between dampings; then what there is, which is not whole.
+std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted, bool* is_whole);
 
 }  // namespace gravitas::study

@@ -95,7 +95,12 @@ class StudyRun {
       }
       if (options_.problems.empty() && options_.methods.empty() && options_.scenes.empty()) {
         report_({done_, ladders_, "springs", "the map of stability"});
-        for (v1::Limit& limit : map_stability(limits_.interrupted)) *study.add_limits() = std::move(limit);
+        bool is_whole = false;
+        // of an integrator whose row is cut, none
+        std::vector<v1::Limit> limits = map_stability(limits_.interrupted, &is_whole);
+        study.set_is_interrupted(!is_whole);
+        if (is_whole)
+          for (v1::Limit& limit : limits) *study.add_limits() = std::move(limit);
       }
     } catch (const StudyInterrupted&) {
       study.set_is_interrupted(true);
@@ -135,6 +140,8 @@ class StudyRun {
     const double steps = std::clamp(subject.duration() / subject.time_step() / 4.0, 1.0, 1e6);
     climb->steps = static_cast<std::uint32_t>(std::lround(steps));
     climb->look_every = (climb->steps + kMostLooks - 1) / kMostLooks;
+    // the end is looked at, too
+    climb->steps = (climb->steps + climb->look_every - 1) / climb->look_every * climb->look_every;
     climb->tasks = subject.has_contacts() ? kContacts : kMotion | kStiff;
     describe(problem_name(scene), "own", climb.get());
     climbs_.push_back(std::move(climb));
@@ -177,7 +184,13 @@ class StudyRun {
       report_({done_, ladders_, result->name(), method.name()});
       v1::Rung rung;
       if (too_long.empty()) {
-        rung = make_rung(climb.subject, method, setting, climb.measure, limits_);
+        try {
+          rung = make_rung(climb.subject, method, setting, climb.measure, limits_);
+        } catch (const StudyInterrupted&) {
+          judge(result->duration(), result->uncertainty(), ladder);
+          ladder->set_is_interrupted(true);
+          throw;
+        }
         // a single step of a finer one may take hours
         if (rung.too_long()) too_long = "not run: a coarser one took too long";
       } else {
@@ -201,7 +214,9 @@ class StudyRun {
           all.push_back({climb.steps, climb.look_every, accuracy});
     } else {
       const std::uint32_t rungs = options_.rungs > 0 ? options_.rungs : kRungs;
-      for (std::uint32_t i = 0; i < rungs; ++i) all.push_back({climb.steps << i, climb.look_every << i});
+      constexpr std::uint64_t kMostSteps = 1U << 31U;
+      for (std::uint32_t i = 0; i < rungs && (std::uint64_t{climb.steps} << i) <= kMostSteps; ++i)
+        all.push_back({climb.steps << i, climb.look_every << i});
     }
     return all;
   }

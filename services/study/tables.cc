@@ -144,9 +144,11 @@ std::string stability_section(const v1::Study& study) {
 }
 
 std::string gate_text(const v1::Study& study) {
-  if (study.demands() == 0) return "the gate demands nothing of what was run\n";
-  if (study.failures().empty()) return fmt::format("the gate is passed: {} demands\n", study.demands());
-  std::string text = fmt::format("the gate failed: {} of {} demands\n", study.failures_size(), study.demands());
+  if (study.failures().empty())
+    return study.demands() == 0 ? "the gate demands nothing of what was run\n"
+                                : fmt::format("the gate is passed: {} demands\n", study.demands());
+  // what has no reference fails, too
+  std::string text = fmt::format("the gate failed, of {} demands:\n", study.demands());
   for (const std::string& failure : study.failures()) text += "  " + failure + "\n";
   return text;
 }

@@ -86,7 +86,7 @@ TEST_P(PressedAgain, StopsAndRopesGiveNoEnergy) {
 }
 
 // At steps that the spring swings in many times as at those that resolve it.
-TEST_P(PressedAgain, MotionIsThatOfShortSteps) {
+TEST_P(PressedAgain, LoseTheEnergyThatShortStepsLose) {
   const Fall fall{.light = 1.0};
   const auto end = [&](double step) {
     SceneRun run(scene_of(fall), {std::string("Integrator=") + GetParam(), set("Simulator.TimeStep", step),

@@ -220,6 +220,18 @@ Environment { Space { Bodies {
   EXPECT_LT(report.energy().final(), 0.7 * report.energy().initial());  // they have met
 }
 
+// Nor did what flies over it.
+TEST(Figures, WhatComesAcrossInTheFirstStepDoesNotOverlapAtTheStart) {
+  const report::v1::Report report = figures_of(R"(
+Geometries { Geometry { Type = "Sphere" Id = "Ball" CustomProperties { Radius = 0.3 } } }
+Environment { Space { Bodies {
+  Body { Id = "A" GeometryId = "Ball" Mass = 1 KineticProperties { Position = {0, 0.5, 0} LinearVelocity = {60, 0, 0} } }
+  Body { Id = "B" GeometryId = "Ball" Mass = 1 KineticProperties { Position = {1, 0, 0} } } } } })",
+                                               1);
+  EXPECT_EQ(report.warnings_size(), 0);
+  EXPECT_LT(report.energy().final(), 0.999 * report.energy().initial());  // they have met
+}
+
 // A rod that turns its end to the floor in the first step began above it.
 TEST(Figures, WhatTurnsDownInTheFirstStepDoesNotOverlapAtTheStart) {
   for (const char* simulator : {"Basic", "Substepping"}) {

@@ -76,8 +76,8 @@ class ImplicitMidpoint final : public IntegratorPlugin {
             .version = "1.1",
             .slot = Slot::kIntegrator,
             .meaning =
-                "Implicit midpoint rule on the rotation group, order 2, keeps momentum, and the energy of what no "
-                "force turns.",
+                "Implicit midpoint rule on the rotation group, order 2, keeps momentum, with joints that hold by locks "
+                "alone, too, and the energy of what no force turns.",
             .capabilities = {"order=2"},
             .theta = 0.5};
   }
@@ -257,8 +257,8 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     double last = HUGE_VAL;
     for (int i = 0; i < kMostIterations; ++i) {
       if (i > 0) change = residual(unknown_);
-      if (!change.allFinite()) break;
       if (keeps_to_joints_) turn_with_spins(&change);
+      if (!change.allFinite()) break;
       unknown_ -= change;
       const double size = size_of(change);
       if (size <= kConverged || (size <= kStagnant && size >= last)) return true;
