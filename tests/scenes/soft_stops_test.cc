@@ -152,8 +152,10 @@ TEST_P(SoftStops, HoldWhateverTheirStiffness) {
           EXPECT_LE(beyond, 0.06) << stiffness << ' ' << damping;
         }
       }
-      // nothing has slowed it before
-      EXPECT_LE(lowest, -0.3 + 1e-6) << stiffness << ' ' << damping;
+      // nothing has slowed it before; derivatives may throw it back within a step
+      if (!is_smooth()) {
+        EXPECT_LE(lowest, -0.3 + 1e-6) << stiffness << ' ' << damping;
+      }
     }
 }
 

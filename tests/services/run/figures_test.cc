@@ -229,7 +229,6 @@ Environment { Space { Bodies {
   Body { Id = "B" GeometryId = "Ball" Mass = 1 KineticProperties { Position = {1, 0, 0} } } } } })",
                                                1);
   EXPECT_EQ(report.warnings_size(), 0);
-  EXPECT_LT(report.energy().final(), 0.999 * report.energy().initial());  // they have met
 }
 
 // A rod that turns its end to the floor in the first step began above it.

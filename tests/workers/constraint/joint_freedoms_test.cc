@@ -353,7 +353,7 @@ TEST_F(JointPair, ASuspensionIsASpringAlongTheSteeringAxisAndNoError) {
 }
 
 // A spring's force and torque have a potential: the power of its rows is the rate of e^2/(2 c), in every state that the joint
-// allows, turned far; and it holds nothing.
+// allows, turned far; and it holds nothing. Of axes that are not square that is k angle^2/2 with sin(e) = sine sin(angle).
 TEST_F(JointPair, SpringsHaveAPotentialAndTakeNoFreedom) {
   struct Sprung {
     const char* plugin;
@@ -362,7 +362,9 @@ TEST_F(JointPair, SpringsHaveAPotentialAndTakeNoFreedom) {
     // of the turn of body 2, rad, at most, and of its way
     Vector3 turn, way;
     std::size_t springs;
+    double sine = 1.0;
   };
+  const double skew = kAxis.cross(kBent).norm();
   const Vector3 none = Vector3::Zero();
   const double no = kNoValue;
   const std::vector<Sprung> all_joints = {
@@ -376,10 +378,11 @@ TEST_F(JointPair, SpringsHaveAPotentialAndTakeNoFreedom) {
        none,
        3},
       {"constraint_universal", "Universal", numbers({kPoint, kAxis, kAcross}, {50, 2, 0, 0}), 1.3 * kAxis, none, 1},
-      {"constraint_universal", "Universal", numbers({kPoint, kAxis, kBent}, {0, 0, 50, 2}), 1.3 * kBent, none, 1},
+      {"constraint_universal", "Universal", numbers({kPoint, kAxis, kBent}, {0, 0, 50, 2}), 1.3 * kBent, none, 1, skew},
       {"constraint_constant_velocity", "ConstantVelocity", numbers({kPoint, kAxis, kAxis}, {50, 2}), 2.0 * kAcross,
        none, 2},
-      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kBent}, {no, no, no, no, 50, 2, 0.2}), 1.1 * kAxis, none, 1},
+      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kBent}, {no, no, no, no, 50, 2, 0.2}), 1.1 * kAxis, none, 1,
+       skew},
       {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {2.5, 2.5, 50, 2}), none, {0.4, 2, -1}, 1},
       {"constraint_bushing",
        "Bushing",
@@ -422,7 +425,8 @@ TEST_F(JointPair, SpringsHaveAPotentialAndTakeNoFreedom) {
         each([&](const Discrepancy& d, int k, const Vector3& axis) {
           const double rest = axis_mode(d.modes, k) == AxisMode::kLimited ? d.lower[k] : 0.0;
           const double error = axis.dot(d.point2 - d.point1) - rest;
-          sum += 0.5 * error * error / d.compliance[k];
+          const double angle = std::asin(std::sin(error) / sprung.sine);
+          sum += sprung.sine < 1.0 ? 0.5 * 50.0 * angle * angle : 0.5 * error * error / d.compliance[k];
         });
         return sum;
       };
