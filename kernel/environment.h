@@ -430,7 +430,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double start_overlap_ = 0.0;  // m, where such a step begins
   bool start_wrench_known_ = false, attempt_counts_ = true;
   enum class LastJoints { kNone, kFresh, kHeld } last_joints_ = LastJoints::kNone;  // in discrepancies, held_joints
-  std::vector<std::size_t> next_in_group_, pressed_stops_;  // scratch of merge_discrepancies(), length_of_flight()
+  std::vector<std::size_t> next_in_group_;                                          // scratch of merge_discrepancies()
 
   CommitFigures figures_;
   Hash state_hash_, chain_hash_;

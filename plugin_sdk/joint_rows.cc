@@ -200,6 +200,17 @@ JointSpring read_spring(PropertyCursor* bound) {
   return {stiffness, bound->number()};
 }
 
+void write_soft_limits(const JointLimits& limits, BoundWriter* out) {
+  write_limits(limits, out);
+  write_spring(limits.spring, out);
+}
+
+JointLimits read_soft_limits(PropertyCursor* bound) {
+  JointLimits limits = read_limits(bound);
+  limits.spring = read_spring(bound);
+  return limits;
+}
+
 Discrepancy sprung(Discrepancy row, const JointSpring& spring) {
   spring.yield_on(0, &row);
   return row;

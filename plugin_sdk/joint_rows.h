@@ -100,6 +100,9 @@ JointSpring read_limit_spring(PropertyCursor* properties, std::string_view type,
 
 void write_spring(const JointSpring& spring, BoundWriter* out);
 JointSpring read_spring(PropertyCursor* bound);
+// Limits with the spring that they give way by.
+void write_soft_limits(const JointLimits& limits, BoundWriter* out);
+JointLimits read_soft_limits(PropertyCursor* bound);
 // A row (its first axis) that the spring holds, as far as it does.
 Discrepancy sprung(Discrepancy row, const JointSpring& spring);
 

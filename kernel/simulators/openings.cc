@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "kernel/environment.h"
@@ -36,10 +37,14 @@ double Environment::length_of_flight(double begin, double length) {
   const auto is_pressed_again = [&](const std::vector<StopGap>& stops, std::size_t k) {
     return has_let_go(k) && stops[k].is_pressed_again(first_stops_[k], data_.held_force[k / 2] != 0.0);
   };
-  pressed_stops_.clear();
-  for (std::size_t k = 0; k < end_stops_.size(); ++k)
-    if (is_pressed_again(end_stops_, k)) pressed_stops_.push_back(k);
-  if (pressed_stops_.empty()) return length;
+  const auto pressed_again = [&](const std::vector<StopGap>& stops) {
+    std::vector<std::size_t> all;
+    for (std::size_t k = 0; k < stops.size(); ++k)
+      if (is_pressed_again(stops, k)) all.push_back(k);
+    return all;
+  };
+  std::vector<std::size_t> again = pressed_again(end_stops_);
+  if (again.empty()) return length;
   double closed = 0.0, open = 0.0, pressed = length;
   for (int i = 0; i < kMostFlightLooks && (open == 0.0 || open - closed > kFlightShare * length); ++i) {
     const double middle = 0.5 * (closed + (open > 0.0 ? open : pressed));
@@ -47,17 +52,11 @@ double Environment::length_of_flight(double begin, double length) {
     constrain(integrate());
     find_stops(true, &trial_stops_);
     if (trial_stops_.size() != first_stops_.size()) return length;
-    bool flies = false, is_pressed = false;
-    for (std::size_t k = 0; k < trial_stops_.size(); ++k) {
-      is_pressed = is_pressed || is_pressed_again(trial_stops_, k);
-      flies = flies || (has_let_go(k) && trial_stops_[k].is_open() &&
-                        std::ranges::find(pressed_stops_, k) != pressed_stops_.end());
-    }
-    if (is_pressed) {
+    const bool flies =
+        std::ranges::any_of(again, [&](std::size_t k) { return has_let_go(k) && trial_stops_[k].is_open(); });
+    if (std::vector<std::size_t> now = pressed_again(trial_stops_); !now.empty()) {
       pressed = middle, open = 0.0;
-      pressed_stops_.clear();
-      for (std::size_t k = 0; k < trial_stops_.size(); ++k)
-        if (is_pressed_again(trial_stops_, k)) pressed_stops_.push_back(k);
+      again = std::move(now);
     } else {
       (flies ? open : closed) = middle;
     }

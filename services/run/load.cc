@@ -63,6 +63,12 @@ void apply_hosting(const std::vector<HostingChoice>& choices, kernel::Environmen
 
 std::string installed_worker() { return kernel::worker_program(); }
 
+std::filesystem::path folder_above_with(const std::filesystem::path& what) {
+  for (std::filesystem::path above = installed_worker(); above.has_relative_path(); above = above.parent_path())
+    if (std::filesystem::exists(above.parent_path() / what)) return above.parent_path();
+  return {};
+}
+
 std::string installed_plugins() {
   const std::filesystem::path bin = std::filesystem::path(kernel::worker_program()).parent_path();
   return (bin.parent_path() / "lib" / "gravitas").string();

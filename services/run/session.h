@@ -1,6 +1,7 @@
 // One run from scene files to a report: what `gravitas run` and `gravitas plan` do.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -127,5 +128,7 @@ recorder::v1::CapsuleHeader capsule_header(const RunOptions& options, Slot slot)
 // Folders of this installation.
 std::string installed_worker();
 std::string installed_plugins();
+// The nearest folder above the program that holds `what`; empty where none does.
+std::filesystem::path folder_above_with(const std::filesystem::path& what);
 
 }  // namespace gravitas

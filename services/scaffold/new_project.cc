@@ -61,14 +61,16 @@ void demand_name(const std::string& name, const Catalog& installed) {
   }
 }
 
-// The tree that this program was built in: the folder above it with the templates.
-fs::path templates_above(const fs::path& build) {
-  for (fs::path tree = build; tree.has_relative_path(); tree = tree.parent_path())
-    if (fs::exists(tree / "services/scaffold/templates")) return tree;
+constexpr const char* kTemplates = "services/scaffold/templates";
+
+// The tree that this program was built in.
+fs::path tree_of(const fs::path& build) {
+  fs::path tree = folder_above_with(kTemplates);
+  if (!tree.empty()) return tree;
   throw BadInput(
-      fmt::format("gravitas new: no folder above '{}' holds services/scaffold/templates; required: the program "
-                  "in the checkout that it was built in, which the project's build needs, too",
-                  build.string()));
+      fmt::format("gravitas new: no folder above '{}' holds {}; required: the program in the checkout that it was "
+                  "built in, which the project's build needs, too",
+                  build.string(), kTemplates));
 }
 
 std::string text_of(const fs::path& file) {
@@ -160,7 +162,7 @@ Project write_project(const ProjectOptions& options, const Catalog& installed) {
   const Kind& kind = kind_of(options.kind);
   demand_name(options.name, installed);
   const fs::path build = fs::path(installed_worker()).parent_path().parent_path();
-  const fs::path tree = templates_above(build), templates = tree / "services/scaffold/templates";
+  const fs::path tree = tree_of(build), templates = tree / kTemplates;
   // stands between quotes in CMake, a shell and Python
   if (build.string().find_first_of("\"\\$`;\n") != std::string::npos)
     throw BadInput(

@@ -59,6 +59,13 @@ double evaluations(const v1::Rung& rung) {
   return static_cast<double>(std::max(rung.derivatives() + rung.iterations(), rung.steps()));
 }
 
+double best_error(const v1::Ladder& ladder) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const v1::Rung& rung : ladder.rungs())
+    if (is_good(rung)) best = std::min(best, rung.error());
+  return best;
+}
+
 void judge(double duration, double uncertainty, v1::Ladder* ladder) {
   ladder->clear_reached();
   if (ladder->climbs() == "TimeStep") {

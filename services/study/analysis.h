@@ -16,6 +16,9 @@ inline constexpr std::array<double, 3> kWantedErrors = {1e-3, 1e-6, 1e-9};
 // the steps.
 double evaluations(const v1::Rung& rung);
 
+// Of the rungs that did not fail; infinite where all did.
+double best_error(const v1::Ladder& ladder);
+
 // Fills observed_order, achieved_to_requested and reached from the rungs; `duration` in s. Rungs that failed count for
 // none of them.
 void judge(double duration, double uncertainty, v1::Ladder* ladder);

@@ -16,7 +16,7 @@ namespace {
 // Distinct for most eyes, and by their marks for all.
 constexpr std::array<const char*, 10> kCurveColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00",
                                                        "#56b4e9", "#7b3fa0", "#222222", "#e69f00", "#7f7f7f"};
-constexpr double kMarkSize = 3.2, kLegendLine = 19.0, kEdgeRoom = 16.0;
+constexpr double kMarkSize = 3.2, kLegendLine = 19.0;
 constexpr const char* kFaint = "stroke=\"#e4e4e4\"";
 
 std::string mark_text(std::size_t number, double x, double y, bool is_hollow) {
@@ -163,7 +163,7 @@ std::string curve_text(const Frame& frame, const Curve& curve, Labels* labels) {
     if (!curve.marks[i].label.empty()) marks += labels->place(x, y, curve.marks[i].label, colour);
   }
   if (curve.has_steps && !curve.marks.empty()) points += fmt::format("{:.2f},{:.2f} ", frame.right(), height);
-  // inside of the edge, so that they are seen whole
+  // at the edge
   for (const double failed : curve.failed) marks += mark_text(number, frame.right(), frame.y(failed), true);
   return fmt::format("<polyline points=\"{}\" fill=\"none\" {}/>\n{}", points, stroke_of(number), marks);
 }

@@ -43,9 +43,7 @@ bool ran_out_of_time(const v1::Ladder& ladder) {
 }
 
 std::string why_error_failed(const v1::Ladder& ladder, double largest) {
-  double best = std::numeric_limits<double>::infinity();
-  for (const v1::Rung& rung : ladder.rungs())
-    if (rung.failed().empty()) best = std::min(best, rung.error());
+  const double best = best_error(ladder);
   // times are not gated
   if (best <= largest || ran_out_of_time(ladder)) return {};
   return std::isinf(best) ? fmt::format("no rung comes to its end; at most {:g} is wanted", largest)

@@ -210,11 +210,10 @@ const std::vector<Problem>& problem_table() {
 
 std::filesystem::path problem_folder() {
   constexpr const char* kFolder = "deploy/scenes/study";
-  const std::filesystem::path program = std::filesystem::path(installed_worker()).parent_path();
-  for (std::filesystem::path above = program; above.has_relative_path(); above = above.parent_path())
-    if (std::filesystem::exists(above / kFolder)) return above / kFolder;
+  const std::filesystem::path above = folder_above_with(kFolder);
+  if (!above.empty()) return above / kFolder;
   throw BadInput(fmt::format("gravitas study: no folder above '{}' holds {}; --scene FILE studies a scene of your own",
-                             program.string(), kFolder));
+                             installed_worker(), kFolder));
 }
 
 }  // namespace

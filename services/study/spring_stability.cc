@@ -14,6 +14,7 @@
 #include "services/catalog/catalog.h"
 #include "services/run/session.h"
 #include "services/scene/reader.h"
+#include "services/study/rung.h"
 
 namespace gravitas::study {
 namespace {
@@ -170,7 +171,6 @@ const std::map<std::string, Theory>& theories() {
 
 constexpr double kZetas[] = {0.0, 0.1, 1.0, 10.0};
 constexpr int kCellsOfDecade = 4, kFirstDecade = -2, kLastDecade = 6;
-constexpr double kTellsApart = 2e-5;  // of a growth from none, as it is measured
 
 // "SymplecticSplitting 4" as scenes have it.
 std::string integrator_block(const std::string& method) {
@@ -284,18 +284,16 @@ double growth_of(const std::string& method, const SpringPath& moved, const Sprin
   return spectral_radius(next * inverse.pseudoInverse());
 }
 
-std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted, bool* is_whole) {
-  *is_whole = false;
+std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted) {
   Catalog installed = Catalog::installed(installed_worker(), installed_plugins());
   std::vector<v1::Limit> limits;
   for (const auto& [method, theory] : theories()) {
     if (installed.find_plugin(Slot::kIntegrator, method.substr(0, method.find(' '))) == nullptr) continue;
     for (const double zeta : kZetas) {
-      if (interrupted()) return limits;
+      if (interrupted()) throw StudyInterrupted{};
       limits.push_back(limit_of(method, zeta, &installed));
     }
   }
-  *is_whole = true;
   return limits;
 }
 

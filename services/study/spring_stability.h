@@ -32,6 +32,9 @@ double stability_limit(const std::string& method, double zeta);
 // two.
 inline constexpr double kSmallSwing = 0x1p-300;
 
+// An amplification is told from 1, as it is measured, where it is this much more.
+inline constexpr double kTellsApart = 2e-5;
+
 // (x, h v) before the first step and after each.
 using SpringPath = std::vector<Eigen::Vector2d>;
 // The steps that show the map: of methods with a history, which starts anew, the first is another.
@@ -42,7 +45,7 @@ double growth_of(const std::string& method, const SpringPath& moved, const Sprin
                  double noise);
 
 // All installed integrators that have a theory, with zeta 0, 0.1, 1 and 10, each on k h^2 from 1e-2 to 1e6. Throws BadInput.
-// `interrupted` is asked between dampings; then what there is, which is not whole.
-std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted, bool* is_whole);
+// `interrupted` is asked between dampings: throws StudyInterrupted.
+std::vector<v1::Limit> map_stability(const std::function<bool()>& interrupted);
 
 }  // namespace gravitas::study

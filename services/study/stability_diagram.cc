@@ -7,13 +7,13 @@
 #include <cmath>
 
 #include "services/recorder/svg.h"
+#include "services/study/spring_stability.h"
 
 namespace gravitas::study {
 namespace {
 
 // Points of the page.
 constexpr double kBandLeft = 210.0, kBandsTop = 74.0, kRow = 11.0, kBandGap = 7.0, kCellWidth = 17.0, kPageRight = 40.0;
-constexpr double kSteady = 1.0 + 2e-5;  // growth that is none, as it is measured
 
 // From `from` to `to` by a share.
 std::string mixed(const std::array<int, 3>& from, const std::array<int, 3>& to, double share) {
@@ -26,7 +26,7 @@ std::string mixed(const std::array<int, 3>& from, const std::array<int, 3>& to, 
 std::string growth_colour(double growth) {
   constexpr std::array<int, 3> kKept = {214, 230, 244}, kDamped = {33, 102, 172}, kGrows = {253, 212, 190},
                                kFlies = {178, 24, 43};
-  if (growth <= kSteady) return mixed(kKept, kDamped, 1.0 - growth);
+  if (growth <= 1.0 + kTellsApart) return mixed(kKept, kDamped, 1.0 - growth);
   return mixed(kGrows, kFlies, std::log10(growth) / 2.0);
 }
 

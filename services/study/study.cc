@@ -95,12 +95,12 @@ class StudyRun {
       }
       if (options_.problems.empty() && options_.methods.empty() && options_.scenes.empty()) {
         report_({done_, ladders_, "springs", "the map of stability"});
-        bool is_whole = false;
-        // of an integrator whose row is cut, none
-        std::vector<v1::Limit> limits = map_stability(limits_.interrupted, &is_whole);
-        study.set_is_interrupted(!is_whole);
-        if (is_whole)
-          for (v1::Limit& limit : limits) *study.add_limits() = std::move(limit);
+        try {
+          for (v1::Limit& limit : map_stability(limits_.interrupted)) *study.add_limits() = std::move(limit);
+        } catch (const BadInput& refused) {
+          // the ladders are worth keeping
+          study.add_failures(fmt::format("the map of stability: {}", refused.what()));
+        }
       }
     } catch (const StudyInterrupted&) {
       study.set_is_interrupted(true);

@@ -18,13 +18,6 @@ namespace {
 constexpr const char* kNone = "–";
 constexpr std::array<double, 4> kFactors = {1.0, 2.0, 4.0, 16.0};
 
-double best_error(const v1::Ladder& ladder) {
-  double best = std::numeric_limits<double>::infinity();
-  for (const v1::Rung& rung : ladder.rungs())
-    if (rung.failed().empty()) best = std::min(best, rung.error());
-  return best;
-}
-
 // What is better than the reference nobody can say.
 std::string best_text(const v1::Ladder& ladder, double uncertainty) {
   const double best = best_error(ladder);

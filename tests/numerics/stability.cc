@@ -2,11 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
-#include <iterator>
-#include <limits>
-#include <map>
-#include <span>
 #include <stdexcept>
 
 namespace gravitas::harness {

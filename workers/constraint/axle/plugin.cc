@@ -149,8 +149,7 @@ class Axle final : public ConstraintPlugin {
           out.number(swing_between(steering, rolling).angle);
           write_spring(suspension, &out);
           out.number(preload > 0.0 ? -preload / suspension.stiffness : 0.0);
-          write_limits(travel, &out);
-          write_spring(travel.spring, &out);
+          write_soft_limits(travel, &out);
           write_limits(limits, &out);
           write_spring(spring, &out);
           out.number(rest);
@@ -168,8 +167,7 @@ class Axle final : public ConstraintPlugin {
       const double angle = bound.number();
       const JointSpring suspension = read_spring(&bound);
       const double rest_way = bound.number();
-      JointLimits travel = read_limits(&bound);
-      travel.spring = read_spring(&bound);
+      const JointLimits travel = read_soft_limits(&bound);
       const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
       const bool is_rigid = suspension.is_none() && travel.is_none();
       emit(held_point(one, two.position, {is_rigid, true, true}));
@@ -213,8 +211,7 @@ class Axle final : public ConstraintPlugin {
       bound.number();
       const JointSpring suspension = read_spring(&bound);
       bound.number();  // where that is at rest
-      JointLimits travel = read_limits(&bound);
-      travel.spring = read_spring(&bound);
+      const JointLimits travel = read_soft_limits(&bound);
       read_limits(&bound);
       // the steering's spring and its angle
       for (int i = 0; i < 3; ++i) bound.number();

@@ -86,8 +86,7 @@ class Revolute final : public ConstraintPlugin {
           // what is far beyond a single one cannot be told from what comes to it from behind
           limits.spring =
               read_limit_spring(&properties, "Revolute", limits, limits.has_both(), "LowerLimit and UpperLimit");
-          write_limits(limits, &out);
-          write_spring(limits.spring, &out);
+          write_soft_limits(limits, &out);
           write_spring(spring, &out);
           out.number(rest);
           write_drive(drive, &out);
@@ -99,8 +98,7 @@ class Revolute final : public ConstraintPlugin {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       hold_hinge(one, two, emit);
-      JointLimits limits = read_limits(&bound);
-      limits.spring = read_spring(&bound);
+      const JointLimits limits = read_soft_limits(&bound);
       const JointSpring spring = read_spring(&bound);
       const double rest = bound.number();
       const JointDrive drive = read_drive(&bound);

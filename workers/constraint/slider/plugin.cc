@@ -68,8 +68,7 @@ class Slider final : public ConstraintPlugin {
               read_limit_spring(&properties, "Slider", limits, !limits.is_none(), "LowerLimit or UpperLimit");
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
-          write_limits(limits, &out);
-          write_spring(limits.spring, &out);
+          write_soft_limits(limits, &out);
           write_spring(spring, &out);
           out.number(rest);
           write_drive(drive, &out);
@@ -84,8 +83,7 @@ class Slider final : public ConstraintPlugin {
       hold_orientation(one, two, emit);
 
       const Vector3 axis = one.orientation * Vector3::UnitX();
-      JointLimits limits = read_limits(&bound);
-      limits.spring = read_spring(&bound);
+      const JointLimits limits = read_soft_limits(&bound);
       const JointSpring spring = read_spring(&bound);
       const double rest = bound.number();
       const JointDrive drive = read_drive(&bound);

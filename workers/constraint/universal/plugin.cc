@@ -131,10 +131,6 @@ class Universal final : public ConstraintPlugin {
       const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
       const double between = bound.number();
       emit(swing_row(axis1, axis2, between));
-      const Vector3 normal = swing_between(axis1, axis2).axis;
-      const std::array<Vector3, 2> turned_about = {axis2.cross(normal), normal.cross(axis1)};
-      const double sine = axis1.cross(axis2).norm();
-      const std::array<Bar, 2> bars = bars_of(one, two, bodies.spin2 - bodies.spin1);
       // of a direction of either body, across each other at the start
       const Vector3 across1 = one.orientation * Vector3::UnitZ(), across2 = two.orientation * Vector3::UnitZ();
       const double held = math::sin(between);
@@ -148,10 +144,13 @@ class Universal final : public ConstraintPlugin {
       spring_against(axis1, across2, spring2);
       if (bound.at_end()) return;
       PropertyCursor drive1(bound.table(2)), drive2(bound.table(2));
-      drive_about(turned_about[0], sine, &drive1, emit);
-      drive_about(turned_about[1], sine, &drive2, emit);
+      const Vector3 normal = swing_between(axis1, axis2).axis;
+      const double sine = axis1.cross(axis2).norm();
+      drive_about(axis2.cross(normal), sine, &drive1, emit);
+      drive_about(normal.cross(axis1), sine, &drive2, emit);
       if (bound.at_end()) return;
-      const std::array<Bar, 2> start = bars_of(one, two, bodies.start_spin2 - bodies.start_spin1);
+      const std::array<Bar, 2> bars = bars_of(one, two, bodies.spin2 - bodies.spin1),
+                               start = bars_of(one, two, bodies.start_spin2 - bodies.start_spin1);
       for (std::size_t bar = 0; bar < 2; ++bar) {
         const JointLimits limits = read_limits(&bound);
         if (!limits.is_none()) emit(limited_row(bars[bar], start[bar].angle(), limits, between, bodies.elapsed));

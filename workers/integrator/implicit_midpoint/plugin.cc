@@ -33,12 +33,12 @@
 // jump, h |w| in the tens and unequal moments) the step is refused.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "plugin_sdk/interaction_groups.h"
 #include "plugin_sdk/math/dense_lu.h"
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/place_search.h"
 
 namespace gravitas {
 namespace {
@@ -282,14 +282,13 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     keeps_to_joints_ = true;
     const double end = request_->time() + h_;
     derivatives_->wrenches_at_start();  // directions of the joints are those of the start
-    std::vector<Twist> kicks(bodies_.size());
-    if (!find_start(end, &kicks)) return false;
+    if (!find_start(end)) return false;
     derivatives_->wrenches(end, trial_);
     const std::span<const double> impulses = derivatives_->velocity_impulses(end, trial_);
     if (impulses.empty()) return false;
     for (const Body& body : bodies_) {
       BodyState state = trial_.at(body.row);
-      const Twist change = change_of(body, impulses, state.pose.orientation);
+      const Acceleration change = derivatives_->kick(body.row, state.pose.orientation, impulses);
       state.twist = {state.twist.linear + change.linear, state.twist.angular + change.angular};
       trial_.set(body.row, state);
     }
@@ -298,54 +297,37 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return true;
   }
 
-  // The velocities at the start that bring the bodies to where joints want them.
-  bool find_start(double end, std::vector<Twist>* kicks) {
-    constexpr int kMost = 40;
-    constexpr double kNear = 1e-14,
-                     kFound = 1e-6;  // of the way; in a pose where rows depend on each other some is left
-    constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
-    double last = HUGE_VAL;
-    for (int question = 0; question < kMost; ++question) {
-      carry_others(0.5 * h_);
-      if (!iterate(residual(unknown_))) return false;
-      for (std::size_t b = 0; b < bodies_.size(); ++b) trial_.set(bodies_[b].row, end_of(b));
-      carry_others(h_);
-      if (last == 0.0) return true;
+  // The velocities at the start that bring the bodies to where joints want them; they are there in trial_.
+  bool find_start(double end) {
+    constexpr double kFound =
+        1e-6;  // in a pose where rows depend on each other some is left, for the solver at the step's end
+    PlaceSearch search(kFound);
+    if (!move_without_joints()) return false;
+    for (auto verdict = PlaceSearch::Verdict::kGoOn; verdict != PlaceSearch::Verdict::kFound;) {
       const std::span<const double> impulses = derivatives_->place_impulses(end, trial_);
       if (impulses.empty()) return false;
-      // squares, by the masses, of what joints ask for, how far the bodies go, and their coordinates, which are rounded
-      double asked = 0.0, way = 0.0, place = 0.0;
-      for (std::size_t b = 0; b < bodies_.size(); ++b) {
-        Body& body = bodies_[b];
-        const Twist moved = change_of(body, impulses, body.start.pose.orientation);
-        asked += energy(body, moved), way += h_ * h_ * energy(body, body.start.twist);
-        place += energy(body, {body.start.pose.position, Vector3::Ones()});
-        Twist& kick = (*kicks)[b];
+      for (Body& body : bodies_) {
+        const Acceleration moved = derivatives_->kick(body.row, body.start.pose.orientation, impulses);
+        const auto size = [&](const Twist& twist) { return PlaceSearch::size(body.inverse_mass, body.moments, twist); };
+        search.add(size({moved.linear, moved.angular}), h_ * h_ * size(body.start.twist),
+                   size({body.start.pose.position, Vector3::Ones()}));
         // what damping leaves of the way
         const double time = damped_time(body.damping, h_);
-        kick.linear += moved.linear / time, kick.angular += moved.angular / time;
-        const Twist start = derivatives_->start(body.row).twist;
-        start_with({start.linear + kick.linear, start.angular + kick.angular}, &body);
+        start_with({body.undamped.linear + moved.linear / time, body.undamped.angular + moved.angular / time}, &body);
       }
-      // what does not come nearer any more is rounding, or not found
-      const bool is_near = asked <= kNear * kNear * way;
-      if (!is_near && asked >= 0.25 * last && !(asked <= kFound * kFound * way + kRounding * kRounding * place))
-        return false;
-      last = is_near || asked >= 0.25 * last ? 0.0 : asked;
+      verdict = search.judge();
+      if (verdict == PlaceSearch::Verdict::kNotFound || !move_without_joints()) return false;
     }
-    return false;
+    return true;
   }
 
-  // M^-1 of a body's six numbers at an attitude.
-  static Twist change_of(const Body& body, std::span<const double> impulses, const Quaternion& q) {
-    const Vector3 turning = vector_at(impulses, 2 * body.row + 1);
-    return {body.inverse_mass * vector_at(impulses, 2 * body.row),
-            q * body.inverse_moments.cwiseProduct(q.conjugate() * turning)};
-  }
-  // v M v, the attitude left aside.
-  static double energy(const Body& body, const Twist& twist) {
-    return (body.inverse_mass > 0.0 ? twist.linear.squaredNorm() / body.inverse_mass : 0.0) +
-           body.moments.maxCoeff() * twist.angular.squaredNorm();
+  // From the starts to trial_, under forces alone.
+  bool move_without_joints() {
+    carry_others(0.5 * h_);
+    if (!iterate(residual(unknown_))) return false;
+    for (std::size_t b = 0; b < bodies_.size(); ++b) trial_.set(bodies_[b].row, end_of(b));
+    carry_others(h_);
+    return true;
   }
 
   void newton() {

@@ -31,12 +31,12 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "plugin_sdk/integrator.h"
 #include "plugin_sdk/math/free_rotor.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
+#include "plugin_sdk/place_search.h"
 
 namespace gravitas {
 namespace {
@@ -228,31 +228,25 @@ class SymplecticSplitting final : public IntegratorPlugin {
 
   // Drifts from trial_, with kicks_ and what they lack, to where joints want the bodies.
   bool drift_to_joints(Derivatives* derivatives, double from, double to, double s) {
-    constexpr int kMost = 40;
-    constexpr double kNear = 1e-14, kFound = 1e-9;  // of the way
-    constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
     before_ = trial_;
     drift_all(from, to, s);
-    double last = std::numeric_limits<double>::infinity();
-    for (int question = 0; question < kMost; ++question) {
+    constexpr double kFound = 1e-9;
+    PlaceSearch search(kFound);
+    for (auto verdict = PlaceSearch::Verdict::kGoOn; verdict != PlaceSearch::Verdict::kFound;) {
       const std::span<const double> impulses = derivatives->place_impulses(request_->time() + to, trial_);
       if (impulses.empty()) return false;
-      // squares, by the masses, of what joints ask for, how far the bodies go, and their coordinates, which are rounded
-      double asked = 0.0, way = 0.0, place = 0.0;
       for (std::size_t i = 0; i < size(); ++i) {
         if (!is_movable(i)) continue;
         const Twist moved = change(i, impulses, before_);
-        asked += energy(i, moved), way += s * s * (energy(i, before_.at(i).twist) + energy(i, kicks_[i]));
-        place += energy(i, {before_.at(i).pose.position, Vector3::Ones()});
+        search.add(size_of(i, moved), s * s * (size_of(i, before_.at(i).twist) + size_of(i, kicks_[i])),
+                   size_of(i, {before_.at(i).pose.position, Vector3::Ones()}));
         kicks_[i].linear += moved.linear / s, kicks_[i].angular += moved.angular / s;
       }
       drift_all(from, to, s);
-      if (asked <= kNear * kNear * way) return true;
-      // what does not come nearer any more is rounding, or not found
-      if (asked >= 0.25 * last) return asked <= kFound * kFound * way + kRounding * kRounding * place;
-      last = asked;
+      verdict = search.judge();
+      if (verdict == PlaceSearch::Verdict::kNotFound) return false;
     }
-    return false;
+    return true;
   }
 
   // From before_ to trial_.
@@ -355,11 +349,8 @@ class SymplecticSplitting final : public IntegratorPlugin {
     change.angular = q * inverse_moments.cwiseProduct(q.conjugate() * turning);
     return change;
   }
-  // v M v of a body, its attitude left aside.
-  double energy(std::size_t body, const Twist& twist) const {
-    const double inverse_mass = request_->inverse_mass()[body];
-    return (inverse_mass > 0.0 ? twist.linear.squaredNorm() / inverse_mass : 0.0) +
-           vector_at(request_->inertia(), body).maxCoeff() * twist.angular.squaredNorm();
+  double size_of(std::size_t body, const Twist& twist) const {
+    return PlaceSearch::size(request_->inverse_mass()[body], vector_at(request_->inertia(), body), twist);
   }
   static Twist scaled(const Twist& twist, double by) { return {by * twist.linear, by * twist.angular}; }
   void push(std::size_t body, const BodyState& from, const Twist& rate, double s) {
