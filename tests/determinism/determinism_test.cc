@@ -97,7 +97,7 @@ TEST_P(SameBits, InProcessAndInWorkersWithOneThreadOrTwoAndAgain) {
 
 TEST_P(SameBits, WithOneSlotElsewhereThanTheOthers) {
   const std::string scene = GetParam();
-  const std::uint32_t steps = most_steps(scene).value_or(60);
+  const std::uint32_t steps = most_steps(scene).value_or(30);
   const Hashes reference = hashes_of(scene, kAllDirect, 1, {}, steps);
   for (const Slot slot : kSlots) {
     EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kDirect}, {slot, Hosting::kSharedMemory}}, 1, {}, steps),
