@@ -327,8 +327,12 @@ Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode) {
 }
 
 Discrepancy driven_row(const Vector3& axis, double speed, double torque) {
-  Discrepancy drive = row_about(axis, 0.0, AxisMode::kDriven);
-  drive.velocity = speed * axis;
+  return driven(row_about(axis, 0.0, AxisMode::kDriven), speed * axis, torque);
+}
+
+Discrepancy driven(const Discrepancy& row, const Vector3& velocity, double torque) {
+  Discrepancy drive = row;
+  drive.velocity = velocity;
   drive.maximum_force.x() = torque;
   return drive;
 }

@@ -118,6 +118,9 @@ void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter*
 // Calls emit with its row, if there is one, about a unit axis about which the bodies turn by `rate` times what is driven.
 template <typename Emit>
 void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit);
+// The same about first x second: of a unit direction of body 1 and one of body 2, across each other, with which it turns.
+template <typename Emit>
+void drive_across(const Vector3& first, const Vector3& second, double rate, PropertyCursor* bound, Emit&& emit);
 
 // A frame with its origin at `origin` and its first axis along a unit vector (world).
 Pose frame_along(const Vector3& origin, const Vector3& first);
@@ -157,6 +160,8 @@ Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
 
 // The row about a unit axis that a drive keeps at a speed (rad/s) with at most a torque (N m).
 Discrepancy driven_row(const Vector3& axis, double speed, double torque);
+// A row whose first axis is kDriven, at a velocity (rad/s, along that axis) with at most a torque.
+Discrepancy driven(const Discrepancy& row, const Vector3& velocity, double torque);
 
 // The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi);
 // its error is counted from there.
@@ -184,12 +189,21 @@ Pose hinge_frame(const Vector3& point1, const Vector3& point2, const JointBodies
 Vector3 axis_between(const Pose& frame1, const Pose& frame2);
 
 template <typename Emit>
-void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit) {
+void drive_along(const Discrepancy& row, const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit) {
   if (bound->at_end() || !(rate > 0.0)) return;
   const double speed = bound->number(), torque = bound->number();
   // The power is that of the torque about what is driven. No bound stays none: a rate of axes that are square may be
   // 1 + 2^-52, and a quotient by it a bound, of 1.8e308 N m, that nothing tells from one that may be reached.
-  emit(driven_row(axis, rate * speed, torque < kUnlimited ? std::min(torque / rate, kUnlimited) : kUnlimited));
+  emit(driven(row, rate * speed * axis, torque < kUnlimited ? std::min(torque / rate, kUnlimited) : kUnlimited));
+}
+template <typename Emit>
+void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit) {
+  drive_along(row_about(axis, 0.0, AxisMode::kDriven), axis, rate, bound, emit);
+}
+template <typename Emit>
+void drive_across(const Vector3& first, const Vector3& second, double rate, PropertyCursor* bound, Emit&& emit) {
+  const Discrepancy row = swing_row(first, second, kQuarterTurn, AxisMode::kDriven);
+  drive_along(row, row.axes * Vector3::UnitX(), rate, bound, emit);
 }
 
 // Calls emit with the rows that keep axes of two frames across each other: the first of frame 2 across the second and

@@ -24,8 +24,13 @@ bool StopGap::may_have_closed(double time) const {
   return exists() && (gap < 0.0 || (rate > 0.0 && gap < kBend * rate * time));
 }
 
+bool StopGap::asks_the_same(const StopGap& there) const {
+  return std::fabs(asked - there.asked) <= kSlop * std::fabs(asked);
+}
+
 bool StopGap::is_pressed_again(const StopGap& from, bool bears) const {
-  return from.exists() && !gives_way && !from.is_open() && (gap < -slop || (bears && gap > slop && rate > still));
+  return from.exists() && !gives_way && !is_drive && !from.is_open() &&
+         (gap < -slop || (bears && gap > slop && rate > still));
 }
 
 std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const StopBody& body1,
@@ -44,11 +49,14 @@ std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const
   }
   for (int axis = 0; axis < 3; ++axis) {
     const AxisMode mode = axis_mode(discrepancy.modes, axis);
-    if (mode != AxisMode::kLimited && mode != AxisMode::kUnilateral) continue;
+    const double bound = discrepancy.maximum_force[axis];
+    const bool slips = is_drive(mode) && bound > 0.0 && bound < kUnlimited && !acts_as_force(discrepancy, axis) &&
+                       discrepancy.acceleration.isZero(0.0);
+    if (!slips && mode != AxisMode::kLimited && mode != AxisMode::kUnilateral) continue;
     const bool gives_way = discrepancy.compliance[axis] > 0.0;
     if (gives_way && discrepancy.damping[axis] == 0.0) continue;  // pushes with nothing at first
     // gives way as to all that takes no time
-    if (!gives_way && discrepancy.maximum_force[axis] < kUnlimited) continue;
+    if (!slips && !gives_way && bound < kUnlimited) continue;
     const double length = error.norm();
     const bool is_radial = discrepancy.is_radial() && axis == 0 && length > 0.0;
     const Vector3 along = is_radial ? Vector3(error / length) : Vector3(axes.col(axis));
@@ -60,10 +68,14 @@ std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const
     const double speeds = std::fabs(row.linear1.dot(one.linear)) + std::fabs(row.angular1.dot(one.angular)) +
                           std::fabs(row.linear2.dot(two.linear)) + std::fabs(row.angular2.dot(two.angular));
     for (const double sign : {1.0, -1.0}) {
+      StopGap& here = stops[2 * static_cast<std::size_t>(axis) + (sign < 0.0 ? 1 : 0)];
+      if (slips) {
+        here = {sign * rate, 0.0, still_rate(speeds), 1.0, 0.0, false, true, state.desired_velocity};
+        continue;
+      }
       const std::optional<JointStop> stop = gives_way ? soft_stop_of(state, sign) : stop_of(state, sign);
       if (!stop) continue;
-      stops[2 * static_cast<std::size_t>(axis) + (sign < 0.0 ? 1 : 0)] = {
-          sign * (state.error_at_start - stop->limit), sign * rate, slop, reach, still_rate(speeds), gives_way};
+      here = {sign * (state.error_at_start - stop->limit), sign * rate, slop, reach, still_rate(speeds), gives_way};
     }
   }
   return stops;
@@ -71,6 +83,7 @@ std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const
 
 double closing_time(const StopGap& from, const StopGap& to, double length) {
   const auto gap_at = [&](double share) {
+    if (to.is_drive) return from.gap + share * (to.gap - from.gap);
     return hermite_point(from.gap, from.rate, to.gap, to.rate, length, share).value;
   };
   double open = 0.0, closed = -1.0, lowest = 0.0;

@@ -1,13 +1,14 @@
-// Where `Smooth` meets stops of joints (plugin_sdk/stop_location.h): a rope comes taut, a hinge meets its limit. The reaction
-// jumps there, and reactions know of stops that were closed where an inner step begins alone (reaction_holdings.cc), so that
-// trials pass them. An inner step ends just before, the next just behind, short enough that what acts in it is nothing;
-// its solve is the impact. So motion keeps the integrator's order between stops, and what bounces, its energy.
+// Where `Smooth` meets stops of joints (plugin_sdk/stop_location.h): a rope comes taut, a hinge meets its limit, a drive comes to
+// its velocity. The reaction jumps there, and reactions know of stops that were closed where an inner step begins alone
+// (reaction_holdings.cc), so that trials pass them. An inner step ends just before, the next just behind, short enough that what
+// acts in it is nothing; its solve is the impact. So motion keeps the integrator's order between stops, and what bounces, its energy.
 //
 // A stop that opens needs no end, unless it is pressed again within the inner step (openings.cc): its force is zero there, and
 // the derivatives let go of it. Flights from one stop back to it that are shorter than kShortestHop of the step are none: the
 // stop is at rest (the solver has nothing arrive that left it in the same inner step). After kMostMeetings the rest of the step is Basic's.
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "kernel/environment.h"
 #include "plugin_sdk/stop_location.h"
@@ -81,6 +82,21 @@ double Environment::next_stop(const Trusted<TrialState>& trial, double begin, do
   find_stops(false, &start_stops_);
   if (start_stops_.size() != end_stops_.size()) return length;
   first_stops_ = start_stops_;
+  for (std::size_t k = 0; k < first_stops_.size(); ++k)
+    if (first_stops_[k].is_drive && !first_stops_[k].asks_the_same(end_stops_[k])) first_stops_[k] = {};
+  const double step = length_of_step(step_count_ + 1), finest = kCrossing * step;
+  // a drive that would go far beyond its velocity is left out of the derivatives
+  const auto leaves_drives_out = [&] {
+    for (std::size_t k = 0; k < first_stops_.size() && k / 2 < least_borne_.size(); ++k)
+      if (first_stops_[k].is_drive && first_stops_[k].is_open() && least_borne_[k / 2] == 0.0) return true;
+    return false;
+  };
+  while (length > finest && leaves_drives_out()) {
+    length *= 0.5;
+    begin_inner_step(begin, length);
+    constrain(integrate());
+    find_stops(true, &end_stops_);
+  }
   length = length_of_flight(begin, length);
   // gaps count from where an open stop is: what leaves one that it is beyond by rounding has not closed it
   const auto count = [&](std::vector<StopGap>* stops) {
@@ -89,7 +105,6 @@ double Environment::next_stop(const Trusted<TrialState>& trial, double begin, do
   };
   count(&start_stops_), count(&end_stops_);
   const auto is_beyond = [](const StopGap& stop) { return stop.exists() && stop.gap < -stop.slop; };
-  const double step = length_of_step(step_count_ + 1), finest = kCrossing * step;
   double open = 0.0, closed = length;
   bool has_closed = std::ranges::any_of(end_stops_, is_beyond), has_left = false;
   for (int i = 1; i <= kMostLooks && !(has_closed && closed - open <= finest); ++i) {

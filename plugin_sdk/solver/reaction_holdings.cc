@@ -33,6 +33,22 @@ bool may_hold(const Discrepancy& d, int axis) {
 
 }  // namespace
 
+// Of bars that are askew their cross carries the normal, and neither body does: an axis told in another state leans to the normal,
+// along which nothing turns. The lean is counted back. The normal is the direction that nothing turned about where it was told.
+double ReactionSolver::driven_rate(const Joint& joint, const Discrepancy& at_start) const {
+  const auto asked_turning = [&](std::uint32_t body) {
+    const std::uint32_t row = bodies_[body].row;
+    return row == kNone ? Vector3(Vector3::Zero()) : vector_at(request_->angular_velocity(), row);
+  };
+  const Vector3 asked = asked_turning(joint.body2) - asked_turning(joint.body1);
+  const Vector3 turning = bodies_[joint.body2].velocity.angular - bodies_[joint.body1].velocity.angular;
+  const SwingDirections told = swing_directions(joint.discrepancy), now = swing_directions(at_start);
+  const bool is_first = std::abs(told.first.dot(asked)) < std::abs(told.second.dot(asked));
+  const Vector3 axis = at_start.axes * Vector3::UnitX();
+  const double along = axis.dot(turning), leaned = axis.cross(is_first ? now.second : now.first).dot(turning);
+  return std::copysign(std::sqrt(along * along + leaned * leaned), along);
+}
+
 ReactionSolver::Holding ReactionSolver::held_always(const Discrepancy& d, int axis) {
   Holding holding;
   holding.holds = true;
@@ -64,7 +80,7 @@ void ReactionSolver::find_holdings() {
       if (!may_hold(d, axis)) continue;
       const Row row = row_of_axis(d, axes, axis, arms, joint);
       Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
-      holding = holding_at_start(d, axis, row);
+      holding = holding_at_start(joint, d, axis, row);
       may_let_go_ = may_let_go_ || holding.holds || holding.push != 0.0;
     }
   }
@@ -145,7 +161,8 @@ void ReactionSolver::turn_to_limit(Joint* joint) {
     add_turns(turns, &joint->discrepancy);
 }
 
-ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, int axis, const Row& row) const {
+ReactionSolver::Holding ReactionSolver::holding_at_start(const Joint& joint, const Discrepancy& d, int axis,
+                                                         const Row& row) const {
   constexpr double kOfChange = 2.0;  // of what it is asked for changes by in a step
   const Body &one = bodies_[row.body1], &two = bodies_[row.body2];
   const Vector3 along = d.is_angular() ? Vector3(to_rotation_matrix(d.axes).col(axis)) : row.direction.linear;
@@ -154,12 +171,13 @@ ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, i
   Holding holding;
   if (is_drive(axis_mode(d.modes, axis))) {
     const double bound = d.maximum_force[axis];
+    const double slip = d.is_swing() ? driven_rate(joint, d) - along.dot(d.velocity) : rate;
     // the velocity that is asked for is that of the state, not of S_n
     const double changed = kOfChange * request_->time_step() * std::abs(along.dot(d.acceleration));
     holding.is_velocity = true;
     holding.least = -bound, holding.most = bound;
-    holding.holds = std::abs(rate) <= still + changed && bound > 0.0;
-    if (!holding.holds) holding.push = std::copysign(bound, -rate), holding.missing = std::abs(rate);
+    holding.holds = std::abs(slip) <= still + changed && bound > 0.0;
+    if (!holding.holds) holding.push = std::copysign(bound, -slip), holding.missing = std::abs(slip);
     return holding;
   }
   const double slop = kAtLimit * (d.is_angular() ? 1.0 : row.reach);
@@ -192,6 +210,7 @@ bool ReactionSolver::release_overloaded() {
 bool ReactionSolver::change_open() {
   constexpr int kMostReturns = 2;
   constexpr double kNothing = 1e-9;  // of the accelerations
+  constexpr double kMostBeyond = 4.0;
   const auto may_change = [](const Holding& one) {
     return !one.holds && (one.missing > 0.0 || (one.is_released && one.returns < kMostReturns));
   };
@@ -216,7 +235,8 @@ bool ReactionSolver::change_open() {
       const Row row = row_of_axis(d, axes, axis, arms_of(d, axes, joint), joint);
       const double change = row.direction.along(moving[row.body1], moving[row.body2]);
       if (holding.missing > 0.0) {
-        if (request_->time_step() * (row.gamma + change) * std::copysign(1.0, holding.push) < holding.missing) continue;
+        const double gained = request_->time_step() * (row.gamma + change) * std::copysign(1.0, holding.push);
+        if (gained < kMostBeyond * holding.missing) continue;
         holding.push = holding.missing = 0.0;
         has_changed = true;
         continue;

@@ -302,6 +302,8 @@ const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
     set_swing({one.pose.orientation * (one.asked.orientation.conjugate() * first),
                two.pose.orientation * (two.asked.orientation.conjugate() * second)},
               held_angle(d), &d);
+    const Vector3 then = joint.discrepancy.axes * Vector3::UnitX(), now = d.axes * Vector3::UnitX();
+    d.velocity = then.dot(d.velocity) * now, d.acceleration = then.dot(d.acceleration) * now;
     return d;
   }
   const Quaternion turn1 = one.pose.orientation * one.asked.orientation.conjugate();

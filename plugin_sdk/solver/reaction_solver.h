@@ -146,12 +146,14 @@ class ReactionSolver {
   // rounding; m or rad.
   double strayed(const Row& row) const;
   static Holding held_always(const Discrepancy& d, int axis);
-  Holding holding_at_start(const Discrepancy& d, int axis, const Row& row) const;
+  Holding holding_at_start(const Joint& joint, const Discrepancy& d, int axis, const Row& row) const;
+  // What a drive across two directions (joint_rows.h) turns at in S_n, where the bodies are, rad/s.
+  double driven_rate(const Joint& joint, const Discrepancy& at_start) const;
   // The multipliers of the rows that hold. Returns what they are missed by.
   double solve_held();
   double find_multipliers();
-  // Lets go of what bears more than it can; holds again what closes without; leaves to the end of the step what reaches its
-  // velocity in it. False where nothing is to change.
+  // Lets go of what bears more than it can; holds again what closes without; leaves to the end of the step what would go far
+  // beyond its velocity in it (the simulator asks again for less of the step, stop_location.h). False where nothing is to change.
   bool change_holdings();
   bool release_overloaded();
   bool change_open();

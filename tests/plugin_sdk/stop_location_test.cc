@@ -49,6 +49,30 @@ TEST(StopGaps, OfARopeGrowAlongIt) {
   EXPECT_NEAR(stops[1].rate, -0.6, 1e-15);
 }
 
+TEST(StopGaps, OfABoundedDriveThatSlipsAreOfItsVelocity) {
+  StopBody turns;
+  turns.velocity.angular = {0, 0, 3};
+  turns.is_pushed = true;
+  const Discrepancy drive = driven_row(Vector3::UnitZ(), 5.0, 2.0);
+  const auto stops = stop_gaps(drive, {}, turns);
+  EXPECT_NEAR(stops[0].gap, -2.0, 1e-15);
+  EXPECT_NEAR(stops[1].gap, 2.0, 1e-15);
+  EXPECT_FALSE(stops[0].is_open());
+  EXPECT_TRUE(stops[1].is_open());
+  StopBody later = turns;
+  later.velocity.angular = {0, 0, 6};
+  const auto passed = stop_gaps(drive, {}, later);
+  EXPECT_NEAR(closing_time(stops[1], passed[1], 0.3), 0.2, 1e-15);
+  EXPECT_FALSE(passed[0].is_pressed_again(stops[0], false));
+  EXPECT_TRUE(passed[1].asks_the_same(stops[1]));
+  EXPECT_FALSE(stop_gaps(driven_row(Vector3::UnitZ(), 5.01, 2.0), {}, later)[1].asks_the_same(stops[1]));
+  // at its velocity neither is open, and one without a bound, or with none at all, never slips
+  later.velocity.angular = {0, 0, 5};
+  for (const StopGap& stop : stop_gaps(drive, {}, later)) EXPECT_FALSE(stop.is_open());
+  for (const double torque : {0.0, kUnlimited})
+    EXPECT_FALSE(stop_gaps(driven_row(Vector3::UnitZ(), 5.0, torque), {}, turns)[1].exists()) << torque;
+}
+
 TEST(StopGaps, AreOfRigidStopsWithRoomAlone) {
   Discrepancy d = limited({0, 0, 0}, {0.1, 0, 0}, 0.2, 0.2);
   EXPECT_FALSE(stop_gaps(d, {}, {})[0].exists());  // a rod

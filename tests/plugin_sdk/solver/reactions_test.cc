@@ -253,8 +253,10 @@ TEST(Reactions, OfABoundedDriveHoldItsVelocityWithinTheBound) {
   EXPECT_EQ(driven(3.0, 25.0).reaction(0), Vector3(-20, 0, 0));
   EXPECT_EQ(driven(3.0, -25.0).reaction(0), Vector3(20, 0, 0));
   EXPECT_EQ(driven(2.8, 12.0).reaction(0), Vector3(20, 0, 0));
-  // (12 + 20)/2 m/s^2 are more than it needs in the step of 10 ms, which is left to its end
-  EXPECT_EQ(driven(2.9, 12.0).reaction(0), Vector3(0, 0, 0));
+  // (12 + 20)/2 m/s^2 are more than it needs in the step of 10 ms: where it would go far beyond, it is left to the step's end
+  EXPECT_EQ(driven(2.9, 12.0).reaction(0), Vector3(20, 0, 0));
+  EXPECT_EQ(driven(2.95, 12.0).reaction(0), Vector3(20, 0, 0));
+  EXPECT_EQ(driven(2.97, 12.0).reaction(0), Vector3(0, 0, 0));
   EXPECT_EQ(driven(3.1, 12.0).reaction(0), Vector3(-20, 0, 0));
 }
 

@@ -200,7 +200,7 @@ class Axle final : public ConstraintPlugin {
       bound.number();  // of the coordinates alone
       if (bound.at_end()) return;
       const Vector3 normal = swing_between(steering, rolling).axis;
-      drive_about(normal.cross(steering), steering.cross(rolling).norm(), &bound, emit);
+      drive_across(-steering, normal, steering.cross(rolling).norm(), &bound, emit);
     });
   }
 

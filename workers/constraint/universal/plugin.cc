@@ -15,7 +15,8 @@
 // Drives. Body 2 turns on body 1 at p a1 + q a2, with p and q what it turns about the bars. So d1 = (a1 - (a1.a2) a2)/sin^2 g has
 // d1.w = p and no part along a2: a torque T d1 does the work T p, as a motor or friction between body 1 and the cross does, and d2
 // alike between the cross and body 2. Each is one row on the velocity about its d, made unit; with a speed of 0 it is the friction
-// of a bearing, of at most its torque.
+// of a bearing, of at most its torque. d1 is told as across a2 and the normal in body 1, d2 as across a1 and the normal in body 2,
+// which they turn with where the bars are square; of others to first order.
 // Shafts that are across the bars turn by tan(phi2) = tan(phi1)/cos(bend), not evenly; ConstantVelocity does.
 #include <algorithm>
 #include <array>
@@ -146,8 +147,8 @@ class Universal final : public ConstraintPlugin {
       PropertyCursor drive1(bound.table(2)), drive2(bound.table(2));
       const Vector3 normal = swing_between(axis1, axis2).axis;
       const double sine = axis1.cross(axis2).norm();
-      drive_about(axis2.cross(normal), sine, &drive1, emit);
-      drive_about(normal.cross(axis1), sine, &drive2, emit);
+      drive_across(-normal, axis2, sine, &drive1, emit);
+      drive_across(-axis1, normal, sine, &drive2, emit);
       if (bound.at_end()) return;
       const std::array<Bar, 2> bars = bars_of(one, two, bodies.spin2 - bodies.spin1),
                                start = bars_of(one, two, bodies.start_spin2 - bodies.start_spin1);
