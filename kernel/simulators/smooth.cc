@@ -5,11 +5,11 @@
 //
 // and before the first step constrain -> solve, for velocities that joints do not allow.
 //
-// The integrator gets the reactions among the wrenches and need not know of joints: it integrates the index-1 form of
-// the equations and keeps its order. What that leaves of joint errors, in position and velocity, is of the size of the
-// method's own error; the solve at the end projects it away along M^-1 J^T. Springs of joints are among the reactions, so
-// that their stiffness bounds the step of an explicit method; the solve is told to leave them alone (kForcesApplied), and what the
-// reactions had along each axis, as limits and bounded drives are there, too.
+// The integrator gets the reactions among the wrenches and need not know of joints: it integrates the index-1 form of the equations and
+// keeps its order. What that leaves of joint errors, in position and velocity, is of the size of the method's own error; the solve at
+// the end projects it away along M^-1 J^T. Springs of joints are among the reactions, so that their stiffness bounds the step of an
+// explicit method; the solve is told to leave them alone (kForcesApplied), and what the reactions had along each axis, as limits and
+// bounded drives are there, too.
 #include <algorithm>
 #include <cmath>
 
@@ -105,11 +105,10 @@ bool Environment::lets_go_of_limits() {
 // closes or a drive slips. Where they take much, the mechanism has passed a place where its rows depend on each other, as a
 // parallelogram that lies flat, and a stage fell on it; or the step is long for the integrator. Energy is lost or gained then.
 void Environment::note_what_joints_take() {
-  constexpr double kMuch = 0.1;  // of the velocities
-  constexpr double kOfHeld = 1e-3, kOfLoad = 1e-6;
+  constexpr double kMuch = 0.1 /* of the velocities */, kOfHeld = 1e-3, kOfLoad = 1e-6;
+  if (!broken_.empty()) return;
   const DiscrepancyAnswer& joints = data_.discrepancies;
   const double h = data_.time_step[0];
-  if (!broken_.empty()) return;
   for (std::size_t i = 0; i < data_.discrepancy_impulse.size(); ++i) {
     const AxisMode mode = axis_mode(joints.mode[i / 3], static_cast<int>(i % 3));
     const bool holds = mode == AxisMode::kLocked || (mode == AxisMode::kLimited && joints.lower[i] == joints.upper[i]);
@@ -118,17 +117,18 @@ void Environment::note_what_joints_take() {
   double taken = 0.0, all = 0.0;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     if (!is_awake(i) || !(model_.inverse_mass[i] > 0.0)) continue;
-    const auto energy = [&](const Vector3& velocity, const Vector3& spin) {
-      return kinetic_energy(1.0 / model_.inverse_mass[i], vector_at(model_.inertia.span(), i),
-                            quaternion_at(data_.trial_orientation.span(), i), {velocity, spin});
+    const Quaternion attitude = quaternion_at(data_.trial_orientation.span(), i);
+    const auto energy = [&](const Twist& motion) {
+      return kinetic_energy(1.0 / model_.inverse_mass[i], vector_at(model_.inertia.span(), i), attitude, motion);
     };
-    const Vector3 velocity = vector_at(data_.trial_linear_velocity.span(), i);
-    const Vector3 spin = vector_at(data_.trial_angular_velocity.span(), i);
-    taken += energy(vector_at(data_.solved_linear_velocity.span(), i) - velocity,
-                    vector_at(data_.solved_angular_velocity.span(), i) - spin);
-    // what rests is moved by roundings of its load
-    all += energy(velocity, spin) +
-           energy(kOfLoad * h * model_.inverse_mass[i] * vector_at(data_.reaction.span(), 2 * i), Vector3::Zero());
+    const Twist before = {vector_at(data_.trial_linear_velocity.span(), i),
+                          vector_at(data_.trial_angular_velocity.span(), i)};
+    taken += energy({vector_at(data_.solved_linear_velocity.span(), i) - before.linear,
+                     vector_at(data_.solved_angular_velocity.span(), i) - before.angular});
+    const auto load = [&](std::uint32_t k) { return Vector3(kOfLoad * h * vector_at(data_.reaction.span(), k)); };
+    all += energy(before) +  // what rests is moved by roundings of its load
+           energy(after_impulse({}, attitude, model_.inverse_mass[i], vector_at(model_.inverse_inertia.span(), i),
+                                load(2 * i), load(2 * i + 1)));
   }
   if (taken > kMuch * kMuch * all)
     taken_by_joints_ = std::max(taken_by_joints_, std::pair(std::sqrt(taken / all), step_count_ + 1));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "plugin_sdk/geometry/mass_properties.h"
+#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/motion_curve.h"
 
 namespace gravitas::scene {
@@ -221,21 +222,32 @@ class BodyBuilder {
                          what() + " is immovable: its velocities are dropped (a body that keeps them is Kinematic)");
   }
 
+  // Pose and velocities that are given beside a Motion are those that it starts with, to 1e-6.
+  void demand_start(const MotionCurve::State& start, const kernel::BodyDescription& given) {
+    constexpr double kSame = 1e-6;
+    const KineticProperties& kinetic = body_.kinetic_properties();
+    const auto demand = [&](int field, double off, double size) {
+      if (!is_written(kinetic, field) || off <= kSame * (1.0 + size)) return;
+      diagnostics_.error(place_of(kinetic, field), what() +
+                                                       " starts where its Motion is at time 0, and as fast; allowed: "
+                                                       "leave out pose and velocities, or give these");
+    };
+    const double turned = log_rotation(given.pose.orientation * start.pose.orientation.conjugate()).norm();
+    demand(KineticProperties::kPositionFieldNumber, (given.pose.position - start.pose.position).norm(),
+           start.pose.position.norm());
+    demand(KineticProperties::kOrientationFieldNumber, turned, 0.0);
+    demand(KineticProperties::kLinearVelocityFieldNumber, (given.twist.linear - start.twist.linear).norm(),
+           start.twist.linear.norm());
+    demand(KineticProperties::kAngularVelocityFieldNumber, (given.twist.angular - start.twist.angular).norm(),
+           start.twist.angular.norm());
+  }
+
   // The body starts where its Motion has it, with the velocities there.
   void set_motion(kernel::BodyDescription* description) {
     const int field = Body::kMotionFieldNumber;
     if (!written(field)) return;
     if (!body_.kinematic()) {
       refuse(field, "has a Motion and is not kinematic; required: Kinematic = true");
-      return;
-    }
-    const KineticProperties& kinetic = body_.kinetic_properties();
-    for (const int other :
-         {KineticProperties::kPositionFieldNumber, KineticProperties::kOrientationFieldNumber,
-          KineticProperties::kLinearVelocityFieldNumber, KineticProperties::kAngularVelocityFieldNumber}) {
-      if (!is_written(kinetic, other)) continue;
-      diagnostics_.error(place_of(kinetic, other),
-                         what() + " starts where its Motion is at time 0; allowed: leave out pose and velocities");
       return;
     }
     std::vector<PropertyProblem> problems;
@@ -248,6 +260,7 @@ class BodyBuilder {
       return;
     }
     const MotionCurve::State start = MotionCurve(description->motion, description->geometry).at(0.0);
+    demand_start(start, *description);
     description->pose = start.pose;
     description->twist = start.twist;
   }

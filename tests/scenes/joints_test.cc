@@ -453,5 +453,24 @@ TEST_P(JointsInMotion, AWallThatIsPulledApartOpensAlike) {
       EXPECT_NEAR(run.body(brick(i, j)).pose.position.y() - j, opened * (j + 0.5) / count, 1e-6) << i << ' ' << j;
 }
 
+// A cone without an Axis is about the way from its point to the body.
+TEST(ConeWithoutAnAxis, IsAboutTheWayToTheBody) {
+  std::vector<Vector3> ends;
+  for (const std::string axis : {"Axis = {3, 0, -4}", ""}) {
+    SceneRun run(R"(
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Environment {
+  Space { Bodies { Body { Id = "B" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1}
+    KineticProperties { Position = {0.6, 1, -0.8} AngularVelocity = {2, 3, 1} } } } }
+  Constraints { Constraint { Type = "Spherical" Id = "J" Body2 = "B" CustomProperties {
+    BindPoint = {0, 1, 0} ReachConeAngle = 0.3 TwistLower = -0.1 TwistUpper = 0.2 )" +
+                 axis + " } } } }");
+    run.to_end();
+    ends.push_back(run.body("B").pose.position);
+  }
+  EXPECT_LE((ends[1] - ends[0]).norm(), 1e-12);
+  EXPECT_LE(std::acos(Vector3(0.6, 0, -0.8).dot(ends[0] - Vector3(0, 1, 0))), 0.3 + 1e-6);
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -47,6 +47,24 @@ TEST(SmoothHolding, ARopeThatIsTautIsARod) {
   }
 }
 
+// The roundings of what presses a hinge on its stop were told as joints that take all of the velocities.
+TEST(SmoothHolding, AHingeThatIsPressedOnItsStopIsNothingToWarnOf) {
+  for (const char* integrator : kOfHighOrder) {
+    SceneRun run(
+        "Forces { Force { Type = \"Basic\" Id = \"F\" CustomProperties { Torque = {0, 0, 1.279260121227908} } } }\n"
+        "Simulator { Type = \"Smooth\" CustomProperties { TimeStep = 0.01 Duration = 1 } }\nEnvironment { Space { "
+        "Bodies { "
+        "Body { Id = \"B\" Mass = 0.3132997052381185 PrincipalMoments = {0.3132997052381185, 0.3132997052381185, "
+        "0.3132997052381185} Forces = {\"F\"} } } } Constraints { Constraint { Type = \"Revolute\" Id = \"J\" Body2 = "
+        "\"B\" "
+        "CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} UpperLimit = 0.11827111003688934 } } "
+        "} }",
+        {set("Integrator", std::string(integrator))});
+    run.to_end();
+    EXPECT_TRUE(run.environment().warnings().empty()) << integrator;
+  }
+}
+
 // v0^2 = g r (2 + 3 cos 60): the rope goes slack 60 degrees from the top, with v^2 = g r cos 60, and the rest is a throw.
 TEST(SmoothHolding, ARopeGoesSlackWhereItsTensionEnds) {
   const double speed = std::sqrt(3.5 * kG);

@@ -141,7 +141,8 @@ TEST_P(SoftStops, HoldWhateverTheirStiffness) {
   for (const double stiffness : {1e2, 1e5, 1e8, 1e11, 1e14})
     for (const double damping : {0.0, 1e2, 1e6}) {
       // derivatives follow each of many bounces
-      SceneRun falling(scene(soft_guide(-0.3, 0.2, stiffness, damping), 1.0 / 60.0, is_smooth() ? 1.0 : 3.0), overrides());
+      SceneRun falling(scene(soft_guide(-0.3, 0.2, stiffness, damping), 1.0 / 60.0, is_smooth() ? 1.0 : 3.0),
+                       overrides());
       const double energy = falling.energy();
       double lowest = 0.0;
       while (!falling.is_done()) {

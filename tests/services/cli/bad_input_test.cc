@@ -107,7 +107,7 @@ const BadScene kBadScenes[] = {
          with_body(""),
      "2:1", "Table has the time 1 after 1"},
     {"unbalanced", "Environment {\n", "2:1", "}"},
-    {"no_axis", with_joint("Spherical", "BindPoint = {0, 2, 0} ReachConeAngle = 1"), "5:1",
+    {"no_axis", with_joint("Spherical", "BindPoint = {0, 0, 0} ReachConeAngle = 1"), "5:1",
      "error: Constraint \"J2\": Spherical: Axis is missing"},
     {"axis_of_length_0", with_joint("Spherical", "BindPoint = {0, 2, 0} ReachConeAngle = 1\nAxis = {0, 0, 0}"), "7:1",
      "error: Constraint \"J2\": Spherical: Axis has no direction"},
@@ -192,7 +192,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Refused, ::testing::ValuesIn(kBadScenes),
 TEST(BadInput, WhatPluginsRefuseIsAsPlainOnEveryCarrierAndInAPlan) {
   const ScratchFolder folder;
   const std::string joint =
-      folder.write("joint.gravitas", with_joint("Spherical", "BindPoint = {0, 2, 0} ReachConeAngle = 1"));
+      folder.write("joint.gravitas", with_joint("Spherical", "BindPoint = {0, 0, 0} ReachConeAngle = 1"));
   const std::string force =
       folder.write("force.gravitas", with_force("Vortex", "Centre = {0, 0, 0} Strength = 1 Axis = {0, 0, 0}"));
   const std::string good = folder.write("good.gravitas", with_body("Body { Id = \"A\" GeometryId = \"S\" Mass = 1 }"));

@@ -292,6 +292,13 @@ TEST(BuildBodies, StartWhereTheirMotionHasThem) {
   EXPECT_EQ(door.motion.rows.size(), 16U);
   expect_vector(door.pose.position, Vector3(1, 2, 3));
   expect_vector(door.twist.linear, Vector3(1, 2, 3));
+  // as it may say itself
+  const BodyDescription same = body(
+      "GeometryId = \"Brick\" Kinematic = true Motion = {{-1, {0, 0, 0}, {1, 0, 0, 0}}, {1, {2, 4, 6}, {1, 0, 0, 0}}} "
+      "KineticProperties { Position = {1, 2, 3} Orientation = {1, 0, 0, 0} LinearVelocity = {1, 2, 3} AngularVelocity "
+      "= {0, 0, 0} }");
+  EXPECT_EQ((same.pose.position - door.pose.position).norm(), 0.0);
+  EXPECT_EQ((same.twist.linear - door.twist.linear).norm(), 0.0);
 }
 
 TEST(BuildBodies, RefuseAMotionThatCannotBeFollowed) {
@@ -300,7 +307,8 @@ TEST(BuildBodies, RefuseAMotionThatCannotBeFollowed) {
   EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" Mass = 1 Motion = {" + row + "}"),
               ElementsAre(HasSubstr("has a Motion and is not kinematic; required: Kinematic = true")));
   EXPECT_THAT(body_errors_of(kinematic + "{" + row + "} KineticProperties { Position = {0, 0, 1} }"),
-              ElementsAre(HasSubstr("starts where its Motion is at time 0; allowed: leave out pose and velocities")));
+              ElementsAre(HasSubstr(
+                  "starts where its Motion is at time 0, and as fast; allowed: leave out pose and velocities")));
   EXPECT_THAT(body_errors_of(kinematic + "{}"),
               ElementsAre(HasSubstr("Motion is a list of 0; allowed: {{t, {px, py, pz}")));
   EXPECT_THAT(body_errors_of(kinematic + "{{0, {0, 0, 0}}}"), ElementsAre(HasSubstr("row 0 of Motion is a list of 2")));

@@ -90,8 +90,10 @@ class Spherical final : public ConstraintPlugin {
                          "from the "
                          "world's x as seen along it; from -z where Axis is along x, to 1e-3."),
               Property::vector("Axis", "1", "world")
-                  .means("Axis of cone and twist at the start, any length; what coordinates are counted from, of a "
-                         "joint without limits, too."),
+                  .means(
+                      "Axis of cone and twist at the start, any length; what coordinates are counted from, of a "
+                      "joint without limits, too. Absent with limits: from BindPoint to the centre of mass of body 2 "
+                      "(of body 1 where that is the world), if it is elsewhere."),
               Property::number("TwistLower", "rad")
                   .at_least(-kHalfTurn)
                   .at_most(0.0)
@@ -136,7 +138,7 @@ class Spherical final : public ConstraintPlugin {
                 out.vector(inverse_transform_point(bodies.pose2, point));
                 // a request may end here: the joint that leaves all turns free
                 if (properties.at_end()) return;
-                Cone cone = read_cone(&properties);
+                Cone cone = read_cone(&properties, bodies.centre() - point);
                 const JointSpring spring = JointSpring::of(&properties);
                 BoundWriter drive;
                 write_turning_drive(bodies, &properties, &drive);
@@ -191,7 +193,9 @@ class Spherical final : public ConstraintPlugin {
     bool limits_nothing() const { return twist.is_none() && angle == 0.0 && irregular.empty(); }
   };
 
-  static Cone read_cone(PropertyCursor* properties) {
+  // `outward`: from the shared point to the centre of mass.
+  static Cone read_cone(PropertyCursor* properties, const Vector3& outward) {
+    constexpr double kShortest = 1e-6;  // m, that still is a direction
     Cone cone;
     const double angle = properties->number();
     cone.irregular = properties->table(2);
@@ -206,9 +210,11 @@ class Spherical final : public ConstraintPlugin {
     demand_cone(cone.irregular);
     cone.has_axis = axis.stableNorm() > 0.0 && axis.allFinite();
     if (cone.limits_nothing() && !cone.has_axis) return cone;
-    if (axis.array().isNaN().all())
+    const bool is_absent = axis.array().isNaN().all();
+    if (is_absent && !(outward.norm() > kShortest))
       throw Refusal("Spherical: Axis is missing, which reach cone and twist limits are measured from");
-    cone.axis = unit_axis(axis, "Spherical: Axis");
+    cone.axis = is_absent ? Vector3(outward.normalized()) : unit_axis(axis, "Spherical: Axis");
+    cone.has_axis = true;
     return cone;
   }
 
