@@ -209,8 +209,8 @@ bool ReactionSolver::release_overloaded() {
 
 bool ReactionSolver::change_open() {
   constexpr int kMostReturns = 2;
-  constexpr double kNothing = 1e-9;  // of the accelerations
-  constexpr double kMostBeyond = 4.0;
+  constexpr double kNothing = 1e-9;    // of the accelerations
+  constexpr double kMostBeyond = 4.0;  // of what a drive is short of, that its bound makes in the step
   const auto may_change = [](const Holding& one) {
     return !one.holds && (one.missing > 0.0 || (one.is_released && one.returns < kMostReturns));
   };
