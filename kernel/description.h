@@ -153,8 +153,7 @@ struct EnvironmentDescription {
 
   SlotDescription space, collision, constraint, force, solver, integrator;
   std::uint32_t threads = 1;  // of each host's parallel_for
-  // Steps from one whose answers are held against laws of physics (plugin_sdk/physics_checks.h) to the next; 1: each,
-  // 0: none.
+  // Every so many steps, answers are held against laws of physics (plugin_sdk/physics_checks.h); 0: never.
   std::uint32_t check_physics_every = 0;
 
   SlotDescription& slot(Slot which);

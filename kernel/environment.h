@@ -161,8 +161,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::span<const std::uint32_t> wake_orders() const { return wake_orders_; }
   bool is_asleep(std::uint32_t body) const { return can_sleep() && front().rested[body] == kAsleep; }
 
-  // At most one; null: nobody. It is told at once of decisions that were made when there was none, but for swaps, which
-  // who ordered them knows.
+  // At most one; null: nobody. It is told at once of decisions that were made when there was none, but for swaps.
   void set_commit_listener(CommitListener* listener);
   // At most one; null: the scene's own rules hold. What it decides is part of what determines the trajectory.
   void set_pair_arbiter(PairArbiter* arbiter) { arbiter_ = arbiter; }
@@ -241,12 +240,13 @@ class Environment : private DerivativeSource, private SlotObserver {
   double next_stop(const Trusted<TrialState>& trial, double begin, double length, double* crossing);
   void find_stops(bool of_trial, std::vector<StopGap>* stops) const;
   void note_what_joints_bear();                          // openings.cc
+  Trusted<TrialState> integrate_shorter(double begin, double* length);
   double length_of_flight(double begin, double length);  // of a stop that opens and is pressed again
   // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
   std::uint64_t most_reaction_blocks() const;
 
   // stages.cc: a stage each.
-  Trusted<TrialState> integrate();
+  Trusted<TrialState> integrate(bool may_be_refused = false);
   Bounds trial_bounds(std::uint32_t body) const;
   // Kinematic bodies with a motion are where it says, whatever an integrator makes of them.
   void follow_motion(double time, const Column<double>& position, const Column<double>& orientation,

@@ -22,8 +22,7 @@ class PairArbiter {
   virtual std::size_t keep_allowed(const Environment& environment, std::span<std::uint32_t> pairs) = 0;
   // As keep_allowed(), of what is known already: decides about nothing.
   virtual std::size_t leave_out_forbidden(std::span<std::uint32_t> pairs) const = 0;
-  // Two bodies a contact, in their order, and the material row of each (kMaterialColumns of plugin_sdk/solver.h), which
-  // holds the scene's.
+  // Two bodies a contact, in their order, and its material row, the scene's (kMaterialColumns of plugin_sdk/solver.h).
   virtual void mix_materials(std::span<const std::uint32_t> bodies, std::span<double> rows) = 0;
 };
 

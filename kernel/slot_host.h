@@ -48,8 +48,7 @@ class SlotHost {
   ~SlotHost();
   std::uint32_t add(const PluginChoice& plugin);
 
-  // Starting is split so that the workers of all hosts start side by side. finish_start() throws StageFault. Each slot
-  // of a host asks for both.
+  // Split so that the workers of all hosts start side by side. The second throws StageFault. Each slot asks for both.
   void begin_start();
   void finish_start();
   // Begins the standbys that are missing, unless as many were lost as may fail.

@@ -50,7 +50,7 @@ Pose Environment::pose_of(const Column<double>& position, const Column<double>& 
   return {vector_at(position.span(), body), quaternion_at(orientation.span(), body)};
 }
 
-Trusted<TrialState> Environment::integrate() {
+Trusted<TrialState> Environment::integrate(bool may_be_refused) {
   const Column<double>& wrench = data_.wrench_is_constant[0] != 0 ? data_.wrench : data_.no_wrench;
   const auto request =
       ids(data_.time, data_.time_step, data_.wrench_is_constant, data_.flags, data_.inverse_mass, model_.inertia,
@@ -58,7 +58,8 @@ Trusted<TrialState> Environment::integrate() {
           start_angular_velocity(), front().plugin_state, front().state_changed, data_.jacobian_blocks);
   const auto reply = ids(data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                          data_.trial_angular_velocity, data_.error_estimate, data_.next_plugin_state);
-  const StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};
+  StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};
+  call.may_be_refused = may_be_refused;
   DerivativeSource* derivatives = data_.wrench_is_constant[0] != 0 ? nullptr : this;
   const auto trial = ask(Stage::kIntegrate, &integrator_, call, derivatives,
                          [&](const auto& answer) { return validator_.trial_state(answer, data_, front()); });

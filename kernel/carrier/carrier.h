@@ -34,6 +34,7 @@ struct StageCall {
   std::uint32_t attempt = 0;
   // The answer is held against another one, and not used.
   bool is_compared = false;
+  bool may_be_refused = false;  // by who is well: less will be asked for
 
   const stage::MethodInfo& info() const { return stage::method_info(method); }
 };

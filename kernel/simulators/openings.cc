@@ -15,7 +15,7 @@
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kMostFlightLooks = 24;
+constexpr int kMostFlightLooks = 24, kMostHalvings = 10;
 constexpr double kFlightShare = 1.0 / 64;  // of the length, to which it is known where the flight begins
 
 }  // namespace
@@ -28,6 +28,16 @@ void Environment::note_what_joints_bear() {
     const double borne = std::abs(data_.held_force[i]);
     least_borne_[i] = is_first ? borne : std::min(least_borne_[i], borne);
   }
+}
+
+// A trial that holds stops which it has left long ago may come to where no integrator can follow it: half of it is tried then.
+Trusted<TrialState> Environment::integrate_shorter(double begin, double* length) {
+  for (int halvings = 0;; ++halvings, *length *= 0.5) try {
+      begin_inner_step(begin, *length);
+      return integrate(halvings < kMostHalvings);
+    } catch (const StageFault& fault) {
+      if (halvings == kMostHalvings || fault.kind != FaultKind::kRefusal || fault.slot != Slot::kIntegrator) throw;
+    }
 }
 
 // Where stops are pressed again in S*: how long an inner step is that ends while they are open. In end_stops_ are the stops where it

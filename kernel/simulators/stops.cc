@@ -16,7 +16,8 @@
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kMostMeetings = 1000, kMostLooks = 100;
+constexpr int kManyMeetings = 10, kMostMeetings = 1000, kMostLooks = 100;
+constexpr double kReach = 4.0;         // of the inner step before: how long a trial is where many stops are met
 constexpr double kCrossing = 1e-9;     // of the step, that an inner step which passes a stop is long
 constexpr double kShortestHop = 1e-6;  // of the step
 constexpr double kLeadGap = 1e-8;      // of its reach: gap at which a step ends before a stop
@@ -25,16 +26,19 @@ constexpr int kHalved = 4;             // every so many trials, whatever the cub
 }  // namespace
 
 void Environment::meet_stops(double begin, double length) {
-  double done = 0.0, crossing = 0.0;
+  double done = 0.0, crossing = 0.0, reach = length;
   for (int inner = 0; done < length && !must_restart_; ++inner) {
     const double left = length - done;
-    double stop = crossing > 0.0 ? std::min(crossing, left) : left;
-    begin_inner_step(begin + done, stop);
-    Trusted<TrialState> trial = integrate();
-    if (crossing == 0.0 && inner < kMostMeetings)
-      stop = next_stop(trial, begin + done, left, &crossing);
-    else
+    const double asked = std::min(crossing > 0.0 ? crossing : inner < kMostMeetings ? reach : left, left);
+    double stop = asked;
+    Trusted<TrialState> trial = integrate_shorter(begin + done, &stop);
+    const bool is_short = stop < asked || inner >= kManyMeetings;
+    if (crossing == 0.0 && inner < kMostMeetings) {
+      stop = next_stop(trial, begin + done, stop, &crossing);
+      if (is_short) reach = kReach * stop;
+    } else {
       crossing = 0.0;
+    }
     if (stop != data_.time_step[0]) {
       begin_inner_step(begin + done, stop);
       trial = integrate();
