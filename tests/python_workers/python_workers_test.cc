@@ -18,6 +18,7 @@
 #include "services/run/session.h"
 #include "tests/paths.h"
 #include "tests/run_quietly.h"
+#include "tests/services/cli/program.h"
 
 namespace gravitas {
 namespace {
@@ -177,6 +178,29 @@ TEST(PythonForce, IsKilledAndStoppedFromOutside) {
     EXPECT_THAT(hurt.words, HasSubstr(std::string("\"ordered\": \"") + order));
   EXPECT_THAT(hurt.words, HasSubstr("fault nan of step 20 was not injected: the worker of a Command commits no orders "
                                     "itself; allowed, since they come from outside: kill, hang, stop"));
+}
+
+// Its text with another worker.
+std::string falling_with(const std::string& command) {
+  std::string scene = harness::read_file(kFolder + "falling_with_drag.gravitas");
+  const std::string worker = "force_drag.py";
+  return scene.replace(scene.find(worker), worker.size(), command);
+}
+
+// Whoever dies of it the second time has said that it was read.
+TEST(PythonForce, ARequestThatKillsTwoWorkersIsKept) {
+  const harness::ScratchFolder folder;
+  for (const char* death : {"exit", "segv"}) {
+    folder.write("falling.gravitas", falling_with(in_shell(kFolder + "mortal_drag.py") + " " + death));
+    const std::string there = "cd " + in_shell(folder.path("")) + " && " + kGravitas;
+    const Ended run = ended(there + " run falling.gravitas --steps 30 --checkpoint kept");
+    EXPECT_EQ(run.code, 3) << run.words;
+    EXPECT_THAT(run.words, HasSubstr("paused at step 5: slot force, plugin PythonDrag: "));
+    EXPECT_THAT(run.words, testing::Not(HasSubstr("Failures")));
+    const Ended replay = ended(there + " replay falling.force.step6.capsule");
+    EXPECT_EQ(replay.code, 4) << replay.words;
+    EXPECT_THAT(replay.words, HasSubstr("1 failed again"));
+  }
 }
 
 TEST(PythonSolver, OrdersThatCannotComeFromOutsideAreRefused) {
