@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -180,6 +181,42 @@ TEST(StudyDiagram, ShowsEveryRun) {
   EXPECT_EQ(count("fill=\"white\" stroke"), 2U);
   EXPECT_THAT(drawing,
               AllOf(HasSubstr(with_circles + " (1 failed)"), HasSubstr("CPU s per simulated s"), HasSubstr("0.05 s")));
+}
+
+// Columns of marks that stand close together, each three times.
+TEST(StudyDiagram, LabelsCoverNeitherMarksNorEachOther) {
+  v1::Study study = study_with({});
+  for (int i = 0; i < 3; ++i) {
+    const double cost = 1.0 + 0.1 * i;
+    *study.mutable_problems(0)->add_ladders() = ladder_of("Basic/SemiImplicitEuler/Sequential", 0.01, cost);
+    *study.mutable_problems(0)->add_ladders() = ladder_of("Smooth/SymplecticSplitting4/Direct", 0.02, cost);
+    *study.mutable_problems(0)->add_ladders() = ladder_of("Substepping/Verlet/Newton", 0.03, cost);
+  }
+  const std::string drawing = diagram(study.problems(0));
+  struct Box {
+    double left, bottom, width;
+  };
+  std::vector<Box> labels;
+  const std::regex label("<text x=\"([0-9.]+)\" y=\"([0-9.]+)\" font-size=\"9\"[^>]*>([^<]+)<");
+  for (std::sregex_iterator one(drawing.begin(), drawing.end(), label), end; one != end; ++one)
+    labels.push_back({std::stod((*one)[1]), std::stod((*one)[2]), 5.0 * static_cast<double>((*one)[3].length())});
+  // both ends of a ladder, in both panels
+  EXPECT_EQ(labels.size(), 2U * 2U * 9U);
+  constexpr double kHigh = 8.0;
+  for (std::size_t i = 0; i < labels.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Box &a = labels[i], &b = labels[j];
+      EXPECT_FALSE(a.left < b.left + b.width && b.left < a.left + a.width && std::fabs(a.bottom - b.bottom) < kHigh)
+          << i << ", " << j;
+    }
+  const std::regex mark("<circle cx=\"([0-9.]+)\" cy=\"([0-9.]+)\"");
+  for (std::sregex_iterator one(drawing.begin(), drawing.end(), mark), end; one != end; ++one) {
+    const double x = std::stod((*one)[1]), y = std::stod((*one)[2]);
+    for (const Box& box : labels)
+      EXPECT_FALSE(box.left < x && x < box.left + box.width && box.bottom - kHigh < y && y < box.bottom)
+          << x << " " << y;
+  }
+  EXPECT_NE(drawing.find("stroke-width=\"0.6\""), std::string::npos);  // what leads to those that are far
 }
 
 // A method looks the same whatever stands beside it.
