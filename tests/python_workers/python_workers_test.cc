@@ -16,6 +16,8 @@
 #include "plugin_sdk/body.h"
 #include "services/run/figures.h"
 #include "services/run/session.h"
+#include "services/study/rung.h"
+#include "services/study/tables.h"
 #include "tests/paths.h"
 #include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
@@ -185,6 +187,36 @@ std::string falling_with(const std::string& command) {
   std::string scene = harness::read_file(kFolder + "falling_with_drag.gravitas");
   const std::string worker = "force_drag.py";
   return scene.replace(scene.find(worker), worker.size(), command);
+}
+
+// Nothing but its CPU: ten times 10 ms and more.
+TEST(PythonForce, CountsInAStudy) {
+  class Nothing final : public study::Measure {
+   public:
+    void look(const kernel::Environment&) override {}
+    double error() const override { return 0.0; }
+  };
+  const harness::ScratchFolder folder;
+  Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());
+  const study::Subject subject(folder.write("falling.gravitas", falling_with(in_shell(kFolder + "busy_drag.py"))),
+                               &catalog);
+  const auto rung_within = [&](double cpu_seconds) {
+    study::RunLimits limits;
+    limits.cpu_seconds = cpu_seconds;
+    limits.runs = 1;
+    return study::make_rung(
+        subject, {"Basic", "SemiImplicitEuler", "Sequential"}, {10, 1},
+        [](const auto&) { return std::make_unique<Nothing>(); }, limits);
+  };
+  study::v1::Study study;
+  study::v1::Rung& rung = *study.add_problems()->add_ladders()->add_rungs() = rung_within(100.0);
+  EXPECT_EQ(rung.failed(), "");
+  EXPECT_GE(rung.cpu_min(), 0.1);
+  EXPECT_EQ(rung.hosting(), "direct; grpc: PythonDrag");
+  EXPECT_THAT(study::page(study), HasSubstr("Hosting: direct; grpc: PythonDrag; one thread"));
+  const study::v1::Rung hurried = rung_within(0.05);
+  EXPECT_TRUE(hurried.too_long());
+  EXPECT_GE(hurried.cpu_min(), 0.05);
 }
 
 // Whoever dies of it the second time has said that it was read.
