@@ -11,6 +11,7 @@
 
 #include "services/recorder/csv.h"
 #include "services/study/analysis.h"
+#include "services/study/gate.h"
 
 namespace gravitas::study {
 namespace {
@@ -148,12 +149,15 @@ std::string hosting_text(const v1::Study& study) {
 }
 
 std::string gate_text(const v1::Study& study) {
-  if (study.failures().empty())
+  if (is_passed(study))
     return study.demands() == 0 ? "the gate demands nothing of what was run\n"
                                 : fmt::format("the gate is passed: {} demands\n", study.demands());
   // what has no reference fails, too
-  std::string text = fmt::format("the gate failed, of {} demands:\n", study.demands());
+  std::string text = fmt::format("the gate {}, of {} demands:\n", study.failures().empty() ? "is not passed" : "failed",
+                                 study.demands());
   for (const std::string& failure : study.failures()) text += "  " + failure + "\n";
+  for (const std::string& missing : study.not_shown()) text += "  not shown: " + missing + "\n";
+  if (study.is_interrupted()) text += "  not shown: what comes after the interruption\n";
   return text;
 }
 

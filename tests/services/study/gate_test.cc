@@ -16,6 +16,7 @@
 #include "services/run/session.h"
 #include "services/study/analysis.h"
 #include "services/study/diagram.h"
+#include "services/study/tables.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas::study {
@@ -29,6 +30,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 // Steps of 0.1 that halve, errors of an order, a cost that doubles.
 v1::Ladder ladder_of(const std::string& method, double order, double cost, int rungs = 8) {
@@ -123,19 +125,44 @@ TEST(StudyGate, FailsWhereOrderErrorOrWorkIsMissed) {
   EXPECT_THAT(failures_of(study, {What::kEvaluations, "top", "A", 1e-9, 80.0}),
               ElementsAre(HasSubstr("does not reach")));
 
-  // what was not run is not judged; a ladder that shows nothing is, unless it ran out of time
-  v1::Study other = study;
-  apply_gate({{What::kOrder, "top", "B", 1.8, 2.2}, {What::kOrder, "spin", "A", 1.8, 2.2}}, &other);
-  EXPECT_EQ(other.demands(), 0U);
-  // the built-in demands are none of a scene that is called like a shipped one
-  other.mutable_problems(0)->set_family("own");
-  apply_gate({{What::kError, "top", "A", 0.0, 1e-30, true}}, &other);
-  EXPECT_EQ(other.demands(), 0U);
   const v1::Study few = study_with({ladder_of("A", 2.0, 1.0, 3)});
   EXPECT_THAT(failures_of(few, {What::kOrder, "top", "A", 1.8, 2.2}), ElementsAre(HasSubstr("shows no order")));
-  v1::Study slow = few;
+}
+
+// What was not run far enough is neither met nor missed.
+TEST(StudyGate, IsNotPassedByWhatIsNotShown) {
+  using What = Demand::What;
+  const v1::Study study = study_with({ladder_of("A", 1.7, 1.0, 3)});
+  const auto verdict_of = [](v1::Study judged, const Demand& demand) {
+    apply_gate({demand}, &judged);
+    EXPECT_THAT(judged.failures(), IsEmpty());
+    EXPECT_EQ(is_passed(judged), judged.not_shown().empty() && !judged.is_interrupted());
+    EXPECT_EQ(summary(judged).find("is passed") != std::string::npos, is_passed(judged) && judged.demands() > 0);
+    return judged.not_shown().empty() ? std::to_string(judged.demands()) : judged.not_shown(0);
+  };
+  EXPECT_EQ(verdict_of(study, {What::kError, "top", "A", 0.0, 0.1}), "1");
+  EXPECT_EQ(verdict_of(study, {What::kOrder, "top", "B", 1.8, 2.2}), "top, B: it was not run");
+  EXPECT_EQ(verdict_of(study, {What::kOrder, "spin", "A", 1.8, 2.2}), "spin, A: it was not run");
+  // the built-in demands are none of what nobody chose, nor of a scene that is called like a shipped one
+  EXPECT_EQ(verdict_of(study, {What::kOrder, "spin", "A", 1.8, 2.2, true}), "0");
+  v1::Study own = study;
+  own.mutable_problems(0)->set_family("own");
+  EXPECT_EQ(verdict_of(own, {What::kError, "top", "A", 0.0, 1e-30, true}), "0");
+
+  v1::Study slow = study;
   slow.mutable_problems(0)->mutable_ladders(0)->mutable_rungs(2)->set_too_long(true);
-  EXPECT_THAT(failures_of(slow, {What::kOrder, "top", "A", 1.8, 2.2}), IsEmpty());
+  const std::string not_run = "; finer rungs were not run, since one took more CPU than it may";
+  EXPECT_EQ(verdict_of(slow, {What::kOrder, "top", "A", 1.8, 2.2}),
+            "top, A: its ladder shows no order; 1.8 to 2.2 is wanted" + not_run);
+  EXPECT_THAT(verdict_of(slow, {What::kError, "top", "A", 0.0, 1e-9}), HasSubstr(not_run));
+  EXPECT_EQ(verdict_of(slow, {What::kEvaluations, "top", "A", 1e-9, 80.0}),
+            "top, A: it does not reach an error of 1e-09" + not_run);
+
+  v1::Study ended = study;
+  ended.set_is_interrupted(true);
+  EXPECT_EQ(verdict_of(ended, {What::kError, "top", "A", 0.0, 0.1}), "1");
+  ended.mutable_problems(0)->mutable_ladders(0)->set_is_interrupted(true);
+  EXPECT_THAT(verdict_of(ended, {What::kOrder, "top", "A", 1.8, 2.2}), HasSubstr("; it was interrupted"));
 }
 
 TEST(StudyGate, FilesAreReadLineByLine) {
@@ -260,6 +287,10 @@ TEST(StudyProgram, WritesWhatItMeasuredAndFailsByItsGate) {
 
   words.back() = folder.write("gate", "error point_pendulum Smooth/RK4/Direct 0.1\n");
   EXPECT_EQ(run_program(words, folder).exit_code, 0);
+  words.back() = folder.write("gate", "error heavy_top Smooth/RK4/Direct 0.1\n");
+  result = run_program(words, folder);
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("heavy_top, Smooth/RK4/Direct: it was not run"));
 }
 
 TEST(StudyProgram, LeavesNothingBehindWhereItRefuses) {
@@ -290,6 +321,7 @@ TEST(StudyProgram, KeepsWhatItHasWhenInterrupted) {
   EXPECT_EQ(result.exit_code, 130) << result.err;
   EXPECT_THAT(result.err, HasSubstr("what was computed is kept"));
   EXPECT_THAT(read_file(out + "/study.csv"), HasSubstr("\nfour_bar,smooth,Smooth/RK4/Direct,"));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("the gate is not passed"), Not(HasSubstr("is passed"))));
 }
 
 }  // namespace
