@@ -47,7 +47,7 @@ class SlotObserver {
   // Another plugin is in place and has not been asked yet. May ask the slot itself.
   virtual void on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) = 0;
   virtual void on_decision(const Decision& decision) = 0;
-  // Nobody may be asked this again: `plugin` died of it, or answered it wrongly, twice.
+  // `plugin` is not asked this again: it died of it, or answered it wrongly, twice, or hung in it once too often.
   virtual void on_poison(const StageCall& call, const PluginChoice& plugin, const StageFault& fault) = 0;
 };
 

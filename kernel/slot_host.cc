@@ -179,7 +179,7 @@ Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* po
     if (attempts->rejections >= 2 || budget.failures >= description_.failures) {
       const bool is_to_blame = attempts->rejections >= 2;
       rung = next_rung(fault.slot);
-      *poison |= is_to_blame && rung != "previous build";
+      *poison |= (is_to_blame || fault.kind == FaultKind::kDeadline) && rung != "previous build";
       if (rung.empty()) throw StageFault(last);
       recovery.plugins_changed = true;
       // one chance there

@@ -144,7 +144,7 @@ int run_study(StudyLine* line) {
     std::cerr << "gravitas: interrupted; what was computed is kept\n";
     return kInterrupted;
   }
-  return result.failures().empty() ? kDone : kExaminedFailed;
+  return study::is_passed(result) ? kDone : kExaminedFailed;
 }
 
 }  // namespace
@@ -158,9 +158,10 @@ void add_study(CLI::App* app, Action* action) {
       "Writes DIR/STUDY.md (tables, what was observed against theory), DIR/study.csv (every run), a diagram a problem "
       "and "
       "profile.svg, stability.csv and stability.svg.\n"
-      "Errors and evaluations are the same on every machine, times are not. Exit code 4: the gate failed, an observed "
-      "order "
-      "more than 0.2 off the theory or an error above its bound; times are not judged.\n"
+      "Errors and evaluations are the same on every machine, times are not. Exit code 4: the gate is not "
+      "passed, as by an observed order more than 0.2 off the theory, an error above its bound, or what was demanded "
+      "and "
+      "not run; times are not judged.\n"
       "A file of --gate holds a line a demand: error PROBLEM METHOD LARGEST; order PROBLEM METHOD LOWEST HIGHEST; "
       "evaluations PROBLEM METHOD ERROR LARGEST.\n"
       "Example: gravitas study --short --out study\n"

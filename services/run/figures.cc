@@ -20,11 +20,9 @@ constexpr double kOverlap = 0.02;
 // Ways of a step, of what the scene measures: nobody means that.
 constexpr double kRunaway = 1e6;
 
-void write_change(const Vector3& initial, const Vector3& final_value, report::v1::VectorChange* change) {
-  for (int k = 0; k < 3; ++k) {
-    change->add_initial(initial[k]);
-    change->add_final(final_value[k]);
-  }
+template <typename Numbers>
+void write_vector(const Vector3& vector, Numbers* numbers) {
+  numbers->Add(vector.begin(), vector.end());
 }
 
 // Numbers of a property among the flattened ones, or nothing if the type has no such property.
@@ -186,24 +184,25 @@ void Figures::look_at(const kernel::InnerStep& inner) {
 }
 
 void Figures::follow(kernel::Environment* environment) {
+  for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
+  last_.reset();
   last_ = totals(environment);
   is_at_start_ = environment->step_count() == 0;
   if (!initial_) {
     reference_energy_ = (initial_ = last_)->energy();
     measure(environment);
   }
-  largest_kinetic_ = std::max(largest_kinetic_, last_.kinetic);
-  const double deviation = std::fabs(last_.energy() - reference_energy_);
+  largest_kinetic_ = std::max(largest_kinetic_, last_->kinetic);
+  const double deviation = std::fabs(last_->energy() - reference_energy_);
   largest_deviation_ = std::max(largest_deviation_, std::isfinite(deviation) ? deviation : HUGE_VAL);
   penetration_ = std::max(penetration_, environment->figures().penetration);
   joint_error_ = std::max(joint_error_, environment->figures().joint_error);
   if (!opening_step_ && joined_size_ > 0.0 && joint_error_ > kTorn * joined_size_)
     opening_step_ = environment->step_count();
-  if (const double way = environment->time_step() * last_.speed;
+  if (const double way = environment->time_step() * last_->speed;
       !runaway_ && scene_size_ > 0.0 && way > kRunaway * scene_size_)
-    runaway_ = Runaway{environment->step_count(), description_.bodies[last_.fastest].id, way,
+    runaway_ = Runaway{environment->step_count(), description_.bodies[last_->fastest].id, way,
                        environment->step_count() == 0 || environment->step_count() + 1 == edited_step_};
-  for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
 }
 
 void Figures::begin_again(kernel::Environment* environment) {
@@ -216,16 +215,22 @@ void Figures::begin_again(kernel::Environment* environment) {
 }
 
 void Figures::write(report::v1::Report* report) const {
-  const Totals initial = initial_.value_or(Totals{});
   const double scale = std::max(std::fabs(reference_energy_), largest_kinetic_);
-  report->mutable_energy()->set_initial(initial.energy());
-  report->mutable_energy()->set_final(last_.energy());
-  report->mutable_energy()->set_max_relative_drift(scale > 0.0 ? largest_deviation_ / scale : 0.0);
-  write_change(initial.linear, last_.linear, report->mutable_linear_momentum());
-  write_change(initial.angular, last_.angular, report->mutable_angular_momentum());
+  if (initial_) {
+    report->mutable_energy()->set_initial(initial_->energy());
+    report->mutable_energy()->set_max_relative_drift(scale > 0.0 ? largest_deviation_ / scale : 0.0);
+    write_vector(initial_->linear, report->mutable_linear_momentum()->mutable_initial());
+    write_vector(initial_->angular, report->mutable_angular_momentum()->mutable_initial());
+  }
+  if (last_) {
+    report->mutable_energy()->set_final(last_->energy());
+    write_vector(last_->linear, report->mutable_linear_momentum()->mutable_final());
+    write_vector(last_->angular, report->mutable_angular_momentum()->mutable_final());
+  }
   report->set_max_penetration(penetration_);
   report->set_max_joint_error(joint_error_);
-  if (!std::isfinite(initial.energy()) || !std::isfinite(last_.energy()))
+  const auto overflows = [](const std::optional<Totals>& one) { return one && !std::isfinite(one->energy()); };
+  if (overflows(initial_) || overflows(last_))
     report->add_warnings("energies are not finite: speeds are so large that their squares overflow");
   if (overlap_.depth > 0.0)
     report->add_warnings(fmt::format(

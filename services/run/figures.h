@@ -15,7 +15,8 @@ class Figures {
  public:
   explicit Figures(const kernel::EnvironmentDescription& description);
 
-  // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential).
+  // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential); then
+  // no energy is written for that state.
   void follow(kernel::Environment* environment);
   // Called for every inner step.
   void look_at(const kernel::InnerStep& inner);
@@ -76,7 +77,7 @@ class Figures {
   std::vector<Drive> drives_;
   std::optional<Totals> initial_;
   double reference_energy_ = 0.0;  // J
-  Totals last_;
+  std::optional<Totals> last_;     // of the state that was committed last; absent where a force failed in it
   double largest_kinetic_ = 0.0, largest_deviation_ = 0.0;
   double penetration_ = 0.0, joint_error_ = 0.0;
   double joined_size_ = 0.0, scene_size_ = 0.0;  // m, of what joints hold together, and of all

@@ -100,8 +100,8 @@ std::string pause_text(const kernel::EnvironmentDescription& description, const 
   std::string text =
       fmt::format("step {}: slot {}, plugin {}: {} ({})", record.step, slot_name(slot), record.fault.plugin,
                   scene::refusal_text(description, record.fault), fault_kind_name(record.fault.kind));
-  // a request that is to blame is said to be kept
-  if (is_poisoned) return text;
+  // a request that is to blame is said to be kept, and so is one that hung, by which the slot has used up the rest
+  if (is_poisoned && record.fault.kind != kernel::FaultKind::kDeadline) return text;
   return text + fmt::format(
                     "; nobody else is asked, since slot {} has used up its Failures = {} (failed calls and starts, "
                     "each with fewer than {} good answers after the one before)",

@@ -85,9 +85,10 @@ class Run final : private kernel::CommitListener {
     if (!options_.instrumentation.empty() || !options_.joints.empty()) survey_.emplace(answering.now, options_.starter);
     if (options_.listener) begin_listening();
     figures_ = std::make_unique<Figures>(description_);
+    // a decision of the start is one of the step after the state that is restored
+    if (!resumed) attend();
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed, answering.now);
-    attend();
     for (const RerunSpec& rerun : reruns_) require_rerun(rerun, *environment_);
     give_orders();
     warn_of_orders_beyond_the_end();
@@ -244,7 +245,9 @@ class Run final : private kernel::CommitListener {
     resumed_tally_ = from->checkpoint.tally();
     journal_ = std::move(from->journal);
     figures_->resume(resumed_tally_, from->checkpoint.edits_size() > 0);
-    guard([&] { figures_->follow(environment_.get()); });
+    attend();
+    // else nobody is left to ask
+    if (result_.outcome == RunOutcome::kCompleted) guard([&] { figures_->follow(environment_.get()); });
   }
 
   // Faults, swaps and comparisons of the command line, with the plugins they name.

@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <initializer_list>
+#include <limits>
 #include <utility>
+#include <vector>
 
 #include "services/recorder/svg.h"
 
@@ -16,7 +18,7 @@ namespace {
 // Distinct for most eyes, and by their marks for all.
 constexpr std::array<const char*, 10> kCurveColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00",
                                                        "#56b4e9", "#7b3fa0", "#222222", "#e69f00", "#7f7f7f"};
-constexpr double kMarkSize = 3.2, kLegendLine = 19.0;
+constexpr double kMarkSize = 3.2, kLegendLine = 19.0, kLegendText = 29.0, kLegendLetter = 6.4;
 constexpr const char* kFaint = "stroke=\"#e4e4e4\"";
 
 std::string mark_text(std::size_t number, double x, double y, bool is_hollow) {
@@ -70,6 +72,8 @@ class Frame {
 
   double x(double value) const { return chart_.left + share(chart_.x, value) * chart_.width; }
   double y(double value) const { return chart_.top + (1.0 - share(chart_.y, value)) * chart_.height; }
+  double left() const { return chart_.left; }
+  double top() const { return chart_.top; }
   double right() const { return chart_.left + chart_.width; }
   double bottom() const { return chart_.top + chart_.height; }
 
@@ -124,58 +128,123 @@ std::string stroke_of(std::size_t style) {
                      style >= kCurveColours.size() ? " stroke-dasharray=\"5 3\"" : "");
 }
 
-// Labels where they cover no other; where there is no such place they are left out.
+// Labels near their marks, where they cover neither marks nor each other, and as little of curves as can be; one that had to
+// go far is led to. Where there is no such place they are left out.
 class Labels {
  public:
-  std::string place(double x, double y, const std::string& text, const std::string& colour) {
-    constexpr double kHigh = 9.0, kWide = 5.2;
-    const double width = kWide * static_cast<double>(text.size());
-    // below, above, and to the sides of the mark
-    for (const auto& [left, bottom] : {std::pair{x - 0.5 * width, y + 14.0}, std::pair{x - 0.5 * width, y - 6.0},
-                                       std::pair{x - width - 6.0, y + 3.0}, std::pair{x + 6.0, y + 3.0}}) {
-      const Box box{left, bottom - kHigh, left + width, bottom};
-      if (std::ranges::any_of(taken_, [&](const Box& other) { return box.meets(other); })) continue;
-      taken_.push_back(box);
-      return svg_text(left, bottom, text, fmt::format("font-size=\"9\" fill=\"{}\"", colour));
-    }
-    return {};
+  explicit Labels(const Frame& frame) : inside_{frame.left(), frame.top(), frame.right(), frame.bottom()} {}
+
+  void avoid_mark(double x, double y) { marks_.push_back({x - kClear, y - kClear, x + kClear, y + kClear}); }
+  void avoid_line(double x1, double y1, double x2, double y2) {
+    const int parts = 1 + static_cast<int>(std::hypot(x2 - x1, y2 - y1) / kSpotDistance);
+    for (int i = 0; i <= parts; ++i) spots_.emplace_back(x1 + (x2 - x1) * i / parts, y1 + (y2 - y1) * i / parts);
+  }
+  void add(double x, double y, const std::string& text, const std::string& colour) {
+    wanted_.push_back({x, y, text, colour});
+  }
+
+  // Once all that they avoid is known.
+  std::string draw() {
+    std::string text;
+    for (const Label& label : wanted_) text += place(label);
+    return text;
   }
 
  private:
   struct Box {
     double left, top, right, bottom;
     bool meets(const Box& b) const { return left < b.right && b.left < right && top < b.bottom && b.top < bottom; }
+    bool holds(const Box& b) const { return left <= b.left && b.right <= right && top <= b.top && b.bottom <= bottom; }
   };
-  std::vector<Box> taken_;
+  struct Label {
+    double x, y;
+    std::string text, colour;
+  };
+
+  // By how far it goes, and what it covers of curves.
+  std::string place(const Label& label) {
+    const double width = kWide * static_cast<double>(label.text.size());
+    Box best{};
+    double best_gap = 0.0, least = std::numeric_limits<double>::infinity();
+    for (double gap = kClear + 1.0; gap < kFarthest; gap += kRing)
+      for (const auto& [dx, dy] : {std::pair{0, 1}, std::pair{0, -1}, std::pair{-1, 0}, std::pair{1, 0},
+                                   std::pair{-1, 1}, std::pair{1, 1}, std::pair{-1, -1}, std::pair{1, -1}}) {
+        const double x = label.x + dx * (gap + 0.5 * width), y = label.y + dy * (gap + 0.5 * kHigh);
+        const Box box{x - 0.5 * width, y - 0.5 * kHigh, x + 0.5 * width, y + 0.5 * kHigh};
+        const auto is_met = [&](const Box& other) { return box.meets(other); };
+        if (!inside_.holds(box) || std::ranges::any_of(marks_, is_met) || std::ranges::any_of(taken_, is_met)) continue;
+        const auto covered = std::ranges::count_if(spots_, [&](const std::pair<double, double>& spot) {
+          return box.meets({spot.first, spot.second, spot.first, spot.second});
+        });
+        const double cost = gap + kSpotCost * static_cast<double>(covered);
+        if (cost < least) least = cost, best = box, best_gap = gap;
+      }
+    if (std::isinf(least)) return {};
+    taken_.push_back(best);
+    std::string text;
+    if (best_gap > kNear)
+      text = svg_line(label.x, label.y, std::clamp(label.x, best.left, best.right),
+                      std::clamp(label.y, best.top, best.bottom),
+                      fmt::format("stroke=\"{}\" stroke-width=\"0.6\"", label.colour));
+    // with a rim, so that it can be read on a line
+    return text + svg_text(best.left, best.bottom - 2.0, label.text,
+                           fmt::format("font-size=\"9\" fill=\"{}\" stroke=\"white\" stroke-width=\"2\" "
+                                       "paint-order=\"stroke\"",
+                                       label.colour));
+  }
+
+  // points: half a mark's size, a letter's, and how far labels go
+  static constexpr double kClear = 4.0, kHigh = 10.0, kWide = 5.8, kRing = 7.0, kNear = 13.0, kFarthest = 90.0;
+  static constexpr double kSpotDistance = 3.0, kSpotCost = 4.0;
+  const Box inside_;
+  std::vector<Box> marks_, taken_;
+  std::vector<std::pair<double, double>> spots_;  // on curves
+  std::vector<Label> wanted_;
 };
 
 std::string curve_text(const Frame& frame, const Curve& curve, Labels* labels) {
   const std::size_t number = curve.style;
   const std::string colour = kCurveColours[number % kCurveColours.size()];
   std::string points, marks;
-  double height = 0.0;
-  for (std::size_t i = 0; i < curve.marks.size(); ++i) {
-    const double x = frame.x(curve.marks[i].x), y = frame.y(curve.marks[i].y);
-    if (curve.has_steps && i > 0) points += fmt::format("{:.2f},{:.2f} ", x, height);
+  double last_x = 0.0, last_y = 0.0;
+  const auto go_to = [&](double x, double y) {
+    if (!points.empty()) labels->avoid_line(last_x, last_y, x, y);
     points += fmt::format("{:.2f},{:.2f} ", x, y);
-    height = y;
+    last_x = x, last_y = y;
+  };
+  for (const Mark& mark : curve.marks) {
+    const double x = frame.x(mark.x), y = frame.y(mark.y);
+    if (curve.has_steps && !points.empty()) go_to(x, last_y);
+    go_to(x, y);
     if (!curve.has_steps) marks += mark_text(number, x, y, false);
-    if (!curve.marks[i].label.empty()) marks += labels->place(x, y, curve.marks[i].label, colour);
+    if (!curve.has_steps) labels->avoid_mark(x, y);
+    if (!mark.label.empty()) labels->add(x, y, mark.label, colour);
   }
-  if (curve.has_steps && !curve.marks.empty()) points += fmt::format("{:.2f},{:.2f} ", frame.right(), height);
+  if (curve.has_steps && !curve.marks.empty()) go_to(frame.right(), last_y);
   // at the edge
-  for (const double failed : curve.failed) marks += mark_text(number, frame.right(), frame.y(failed), true);
+  for (const double failed : curve.failed) {
+    marks += mark_text(number, frame.right(), frame.y(failed), true);
+    labels->avoid_mark(frame.right(), frame.y(failed));
+  }
   return fmt::format("<polyline points=\"{}\" fill=\"none\" {}/>\n{}", points, stroke_of(number), marks);
 }
+
+std::string legend_text(const Curve& curve) { return curve.name + (curve.note.empty() ? "" : " (" + curve.note + ")"); }
 
 }  // namespace
 
 std::string draw(const Chart& chart) {
   const Frame frame(chart);
-  Labels labels;
+  Labels labels(frame);
   std::string text = frame.axes() + frame.guides();
   for (const Curve& curve : chart.curves) text += curve_text(frame, curve, &labels);
-  return text;
+  return text + labels.draw();
+}
+
+double legend_width(const std::vector<Curve>& curves) {
+  std::size_t longest = 0;
+  for (const Curve& curve : curves) longest = std::max(longest, legend_text(curve).size());
+  return kLegendText + kLegendLetter * static_cast<double>(longest);
 }
 
 std::string legend(const std::vector<Curve>& curves, double left, double top) {
@@ -184,7 +253,7 @@ std::string legend(const std::vector<Curve>& curves, double left, double top) {
   for (const Curve& curve : curves) {
     text += svg_line(left, y, left + 22.0, y, stroke_of(curve.style));
     if (!curve.has_steps) text += mark_text(curve.style, left + 11.0, y, false);
-    text += svg_text(left + 29.0, y + 4.0, curve.name + (curve.note.empty() ? "" : " (" + curve.note + ")"));
+    text += svg_text(left + kLegendText, y + 4.0, legend_text(curve));
     y += kLegendLine;
   }
   return text;

@@ -16,7 +16,7 @@ struct Axis {
 
 struct Mark {
   double x, y;
-  std::string label = {};  // beside the mark, where there is room
+  std::string label = {};  // near the mark, where there is room
 };
 
 struct Curve {
@@ -40,6 +40,7 @@ struct Chart {
 // Curves look as their names in the legend do. Styles repeat after 30.
 std::string draw(const Chart& chart);
 std::string legend(const std::vector<Curve>& curves, double left, double top);
+double legend_width(const std::vector<Curve>& curves);
 
 // An axis over whole decades that holds all of `values` that are finite and > 0; at least one decade.
 Axis decades(const std::string& title, const std::vector<double>& values);

@@ -16,7 +16,7 @@ namespace gravitas::study {
 namespace {
 
 constexpr double kLeast = 1e-16;  // no error is shown smaller
-constexpr double kTop = 76.0, kLeft = 62.0, kGap = 66.0, kLegendWidth = 340.0;
+constexpr double kTop = 76.0, kLeft = 62.0, kGap = 66.0, kMargin = 14.0;
 
 // The same of a method in all diagrams.
 std::size_t style_of(const std::string& method) {
@@ -89,7 +89,7 @@ std::string diagram(const v1::Problem& problem) {
       fmt::format("{:g} s; error against: {}, good to {:.1g}", duration, problem.reference(), problem.uncertainty()),
       "fill=\"#555\"");
   parts += draw(time) + draw(work) + legend(time.curves, legend_left, kTop + 10.0);
-  return svg_page(legend_left + kLegendWidth, kTop + time.height + 46.0, parts);
+  return svg_page(legend_left + legend_width(time.curves) + kMargin, kTop + time.height + 46.0, parts);
 }
 
 std::string profile_diagram(const v1::Study& study, double error) {
@@ -116,7 +116,7 @@ std::string profile_diagram(const v1::Study& study, double error) {
     chart.title = fmt::format("{} problems {} contacts", problems, has_contacts ? "with" : "without");
     chart.left = left, chart.top = kTop - 16.0, chart.width = 360.0, chart.height = 300.0;
     parts += draw(chart) + legend(chart.curves, left + chart.width + 16.0, chart.top + 8.0);
-    left += chart.width + kLegendWidth;
+    left += chart.width + 16.0 + legend_width(chart.curves) + kGap;
   }
   return svg_page(left, kTop + 330.0, parts);
 }

@@ -31,9 +31,8 @@ constexpr DemandWord kDemandWords[] = {{"error", Demand::What::kError, 1},
 const v1::Ladder* find_ladder(const v1::Study& study, const Demand& demand) {
   for (const v1::Problem& problem : study.problems())
     for (const v1::Ladder& ladder : problem.ladders())
-      // a ladder that somebody interrupted is none
-      if (problem.name() == demand.problem && !(demand.is_of_shipped && problem.family() == "own") &&
-          ladder.method() == demand.method && ladder.rungs_size() > 0 && !ladder.is_interrupted())
+      if (problem.name() == demand.problem && !(demand.is_built_in && problem.family() == "own") &&
+          ladder.method() == demand.method)
         return &ladder;
   return nullptr;
 }
@@ -42,32 +41,48 @@ bool ran_out_of_time(const v1::Ladder& ladder) {
   return !ladder.rungs().empty() && ladder.rungs().rbegin()->too_long();
 }
 
-std::string why_error_failed(const v1::Ladder& ladder, double largest) {
+// How a ladder misses a demand; without words: it does not.
+struct Miss {
+  std::string why = {};
+  bool finer_rungs_may_do = false;
+};
+
+Miss miss_of_error(const v1::Ladder& ladder, double largest) {
   const double best = best_error(ladder);
-  // times are not gated
-  if (best <= largest || ran_out_of_time(ladder)) return {};
-  return std::isinf(best) ? fmt::format("no rung comes to its end; at most {:g} is wanted", largest)
-                          : fmt::format("its best error is {:.3g}; at most {:g} is wanted", best, largest);
+  if (best <= largest) return {};
+  return {std::isinf(best) ? fmt::format("no rung comes to its end; at most {:g} is wanted", largest)
+                           : fmt::format("its best error is {:.3g}; at most {:g} is wanted", best, largest),
+          true};
 }
 
-std::string why_order_failed(const v1::Ladder& ladder, const Demand& demand) {
+Miss miss_of_order(const v1::Ladder& ladder, const Demand& demand) {
   if (!ladder.has_observed_order())
-    return ran_out_of_time(ladder)
-               ? std::string()
-               : fmt::format("its ladder shows no order; {:g} to {:g} is wanted", demand.low, demand.high);
+    return {fmt::format("its ladder shows no order; {:g} to {:g} is wanted", demand.low, demand.high), true};
   const double order = ladder.observed_order();
   if (order >= demand.low && order <= demand.high) return {};
-  return fmt::format("its observed order is {:.2f}; {:g} to {:g} is wanted", order, demand.low, demand.high);
+  return {fmt::format("its observed order is {:.2f}; {:g} to {:g} is wanted", order, demand.low, demand.high)};
 }
 
-std::string why_evaluations_failed(const v1::Ladder& ladder, const Demand& demand) {
+Miss miss_of_evaluations(const v1::Ladder& ladder, const Demand& demand) {
   double least = std::numeric_limits<double>::infinity();
   for (const v1::Rung& rung : ladder.rungs())
     if (rung.failed().empty() && rung.error() <= demand.low) least = std::min(least, evaluations(rung));
-  if (least <= demand.high || (std::isinf(least) && ran_out_of_time(ladder))) return {};
-  return std::isinf(least) ? fmt::format("it does not reach an error of {:g}", demand.low)
-                           : fmt::format("an error of {:g} takes {:.0f} evaluations; at most {:g} are wanted",
-                                         demand.low, least, demand.high);
+  if (least <= demand.high) return {};
+  if (std::isinf(least)) return {fmt::format("it does not reach an error of {:g}", demand.low), true};
+  return {fmt::format("an error of {:g} takes {:.0f} evaluations; at most {:g} are wanted", demand.low, least,
+                      demand.high)};
+}
+
+Miss miss_of(const Demand& demand, const v1::Ladder& ladder) {
+  switch (demand.what) {
+    case Demand::What::kError:
+      return miss_of_error(ladder, demand.high);
+    case Demand::What::kOrder:
+      return miss_of_order(ladder, demand);
+    case Demand::What::kEvaluations:
+      return miss_of_evaluations(ladder, demand);
+  }
+  return {};
 }
 
 }  // namespace
@@ -132,13 +147,26 @@ std::vector<Demand> read_demands(const std::string& path, std::vector<std::strin
 void apply_gate(const std::vector<Demand>& demands, v1::Study* study) {
   for (const Demand& demand : demands) {
     const v1::Ladder* ladder = find_ladder(*study, demand);
-    if (ladder == nullptr) continue;
+    if (ladder == nullptr && demand.is_built_in) continue;
     study->set_demands(study->demands() + 1);
-    const std::string why = demand.what == Demand::What::kError   ? why_error_failed(*ladder, demand.high)
-                            : demand.what == Demand::What::kOrder ? why_order_failed(*ladder, demand)
-                                                                  : why_evaluations_failed(*ladder, demand);
-    if (!why.empty()) study->add_failures(fmt::format("{}, {}: {}", demand.problem, demand.method, why));
+    const std::string which = fmt::format("{}, {}: ", demand.problem, demand.method);
+    if (ladder == nullptr) {
+      study->add_not_shown(which + "it was not run");
+      continue;
+    }
+    const Miss miss = miss_of(demand, *ladder);
+    if (miss.why.empty()) continue;
+    if (ladder->is_interrupted())
+      study->add_not_shown(which + miss.why + "; it was interrupted");
+    else if (miss.finer_rungs_may_do && ran_out_of_time(*ladder))
+      study->add_not_shown(which + miss.why + "; finer rungs were not run, since one took more CPU than it may");
+    else
+      study->add_failures(which + miss.why);
   }
+}
+
+bool is_passed(const v1::Study& study) {
+  return study.failures().empty() && study.not_shown().empty() && !study.is_interrupted();
 }
 
 }  // namespace gravitas::study

@@ -18,7 +18,8 @@ struct Demand {
   What what;
   std::string problem, method;
   double low, high;
-  bool is_of_shipped = false;  // not of a scene of the user's that is called so, too
+  // Of a problem that is shipped, not of a scene of the user's that is called so, too; nor of what nobody chose to run.
+  bool is_built_in = false;
 };
 
 // A method's order is to be within this of the theory's.
@@ -36,8 +37,11 @@ std::vector<Demand> built_in_demands();
 std::vector<Demand> read_demands(const std::string& path, std::vector<std::string> problems,
                                  std::vector<std::string> methods);
 
-// Fills failures and demands of the study. What was not run, or was interrupted, is not looked at; nothing is missed by a ladder
-// that came to the end of its CPU before it could show it.
+// Fills failures, what is not shown, and demands of the study. Not shown is what a file demands of a ladder that was not
+// run, and what a ladder misses that was interrupted, or came to the end of its CPU.
 void apply_gate(const std::vector<Demand>& demands, v1::Study* study);
+
+// Nothing failed, nothing is not shown, and nobody interrupted it.
+bool is_passed(const v1::Study& study);
 
 }  // namespace gravitas::study

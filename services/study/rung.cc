@@ -1,16 +1,19 @@
 #include "services/study/rung.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <ctime>
 #include <limits>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
@@ -24,18 +27,58 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-double process_seconds() {
+std::optional<double> seconds_of(clockid_t clock) {
   timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  if (clock_gettime(clock, &now) != 0) return std::nullopt;
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
+
+// CPU of this process, and of those that plugins have of their own, each from when it is first asked.
+class CpuClock {
+ public:
+  void follow(int process_id) {
+    if (std::ranges::find(others_, process_id, &Other::process_id) != others_.end()) return;
+    Other other{process_id, 0, 0.0, 0.0};
+    // one of another machine's has none
+    if (clock_getcpuclockid(process_id, &other.clock) != 0) return;
+    other.begin = other.last = seconds_of(other.clock).value_or(0.0);
+    others_.push_back(other);
+  }
+
+  double seconds() {
+    double sum = left_ + seconds_of(CLOCK_PROCESS_CPUTIME_ID).value_or(0.0);
+    for (Other& other : others_) {
+      // of one that has died what is known last
+      other.last = seconds_of(other.clock).value_or(other.last);
+      sum += other.last - other.begin;
+    }
+    return sum;
+  }
+
+  // Those processes end.
+  void leave() {
+    seconds();
+    for (const Other& other : others_) left_ += other.last - other.begin;
+    others_.clear();
+  }
+
+ private:
+  struct Other {
+    int process_id;
+    clockid_t clock;
+    double begin, last;
+  };
+  std::vector<Other> others_;
+  double left_ = 0.0;
+};
 
 struct TooMuchWork {};
 
 // What a run has taken so far; asked by its hosts at every call, since one step may be any work.
 struct Meter {
   const RunLimits& limits;
-  double begin = process_seconds();
+  CpuClock& cpu;
+  double begin = cpu.seconds();
   SteadyClock::time_point next_look = SteadyClock::now() + patience();
   std::uint64_t derivatives = 0, iterations = 0;
 
@@ -48,7 +91,7 @@ struct Meter {
   void check() {
     if (limits.interrupted()) throw StudyInterrupted();
     if (SteadyClock::now() < next_look) return;
-    const double left = limits.cpu_seconds - (process_seconds() - begin);
+    const double left = limits.cpu_seconds - (cpu.seconds() - begin);
     if (left <= 0.0) throw TooMuchWork();
     next_look = SteadyClock::now() +
                 std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(std::min(left, 1e6)));
@@ -79,6 +122,7 @@ class MeteredHost final : public capsule::ForwardingHost {
   kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
                           kernel::DerivativeSource* derivatives) override {
     meter_->check();
+    if (host_->hosting() != kernel::Hosting::kDirect) meter_->cpu.follow(host_->process_id());
     if (derivatives != nullptr) {
       CountedDerivatives counted(derivatives, meter_);
       return host_->call(call, arena, &counted);
@@ -123,23 +167,36 @@ Energy energy_in(kernel::Environment* environment) {
   return energy;
 }
 
+// "direct; grpc: PythonDrag".
+std::string hosting_in(const kernel::Plan& plan) {
+  std::string text = kernel::hosting_name(kernel::Hosting::kDirect);
+  for (const kernel::PlannedSlot& slot : plan.slots)
+    if (slot.hosting != kernel::Hosting::kDirect)
+      text += fmt::format("; {}: {}", kernel::hosting_name(slot.hosting), fmt::join(slot.plugins, ", "));
+  return text;
+}
+
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
 // One of the runs of a rung.
 class TimedRun {
  public:
   TimedRun(kernel::EnvironmentDescription description, const Setting& setting, const MeasureMaker& measure,
-           const RunLimits& limits)
-      : meter_{limits},
+           const RunLimits& limits, CpuClock* cpu)
+      : meter_{limits, *cpu},
         setting_(setting),
         measure_(measure(description)),
         environment_(start(description, metered(&meter_))) {}
+  ~TimedRun() { meter_.cpu.leave(); }
+  TimedRun(const TimedRun&) = delete;
+  TimedRun& operator=(const TimedRun&) = delete;
 
   // CPU of its steps alone, s.
   double go(v1::Rung* rung) {
     kernel::Environment& environment = *environment_;
+    rung->set_hosting(hosting_in(environment.plan()));
     look(rung);
-    const double begin = process_seconds();
+    const double begin = meter_.cpu.seconds();
     double not_counted = 0.0;
     while (environment.step_count() < environment.total_steps()) {
       if (environment.step() != kernel::StepOutcome::kCommitted) {
@@ -149,11 +206,11 @@ class TimedRun {
       rung->set_joint_error(std::max(rung->joint_error(), environment.figures().joint_error));
       rung->set_penetration(std::max(rung->penetration(), environment.figures().penetration));
       if (environment.step_count() % setting_.look_every != 0) continue;
-      const double pause = process_seconds();
+      const double pause = meter_.cpu.seconds();
       look(rung);
-      not_counted += process_seconds() - pause;
+      not_counted += meter_.cpu.seconds() - pause;
     }
-    const double seconds = process_seconds() - begin - not_counted;
+    const double seconds = meter_.cpu.seconds() - begin - not_counted;
     rung->set_error(measure_->error());
     rung->set_energy_drift(drift_ / std::max({std::fabs(first_.sum()), largest_kinetic_, 1e-300}));
     rung->set_steps(environment.step_count());
@@ -232,22 +289,23 @@ v1::Rung make_rung(const Subject& subject, const Method& method, const Setting& 
   rung.set_error(std::numeric_limits<double>::quiet_NaN());
   rung.set_setting(setting.accuracy ? *setting.accuracy : subject.duration() / setting.steps);
   std::vector<double> seconds;
-  const double begin = process_seconds();
+  CpuClock cpu;
+  const double begin = cpu.seconds();
   try {
     const kernel::EnvironmentDescription description = subject.describe(method, setting.steps, setting.accuracy);
     do {
-      seconds.push_back(TimedRun(description, setting, measure, limits).go(&rung));
+      seconds.push_back(TimedRun(description, setting, measure, limits, &cpu).go(&rung));
     } while (rung.failed().empty() && seconds.size() < limits.runs && seconds.front() < limits.repeat_below);
     if (rung.failed().empty() && !(rung.error() < 1.0)) rung.set_failed("off by more than its size");
   } catch (const TooMuchWork&) {
     rung.set_failed(fmt::format("more than {:g} s of CPU", limits.cpu_seconds));
     rung.set_too_long(true);
-    seconds = {process_seconds() - begin};
+    seconds = {cpu.seconds() - begin};
   } catch (const StudyInterrupted&) {
     throw;
   } catch (const std::exception& problem) {
     rung.set_failed(first_line(problem.what()));
-    seconds = {process_seconds() - begin};
+    seconds = {cpu.seconds() - begin};
   }
   std::ranges::sort(seconds);
   rung.set_runs(static_cast<std::uint32_t>(seconds.size()));

@@ -1,4 +1,5 @@
-// One run of a ladder: a scene by a method at a setting, in this process, measured and timed.
+// One run of a ladder: a scene by a method at a setting, measured and timed; in this process, but for plugins that have one
+// of their own, whose CPU counts as well.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +28,7 @@ class Subject {
   // Bodies may touch: Smooth refuses it.
   bool has_contacts() const { return has_contacts_; }
 
-  // With `steps` steps over its Duration, hosted in this process. Throws BadInput.
+  // With `steps` steps over its Duration, hosted in this process, but for a Command or an address. Throws BadInput.
   kernel::EnvironmentDescription describe(const Method& method, std::uint32_t steps,
                                           std::optional<double> accuracy) const;
 

@@ -11,6 +11,7 @@
 
 #include "services/recorder/csv.h"
 #include "services/study/analysis.h"
+#include "services/study/gate.h"
 
 namespace gravitas::study {
 namespace {
@@ -136,13 +137,27 @@ std::string stability_section(const v1::Study& study) {
   return text;
 }
 
+// What is not direct has processes of its own.
+std::string hosting_text(const v1::Study& study) {
+  std::vector<std::string> ways;
+  for (const v1::Problem& problem : study.problems())
+    for (const v1::Ladder& ladder : problem.ladders())
+      for (const v1::Rung& rung : ladder.rungs())
+        if (!rung.hosting().empty() && std::ranges::find(ways, rung.hosting()) == ways.end())
+          ways.push_back(rung.hosting());
+  return ways.empty() ? "direct" : fmt::format("{}", fmt::join(ways, " or "));
+}
+
 std::string gate_text(const v1::Study& study) {
-  if (study.failures().empty())
+  if (is_passed(study))
     return study.demands() == 0 ? "the gate demands nothing of what was run\n"
                                 : fmt::format("the gate is passed: {} demands\n", study.demands());
   // what has no reference fails, too
-  std::string text = fmt::format("the gate failed, of {} demands:\n", study.demands());
+  std::string text = fmt::format("the gate {}, of {} demands:\n", study.failures().empty() ? "is not passed" : "failed",
+                                 study.demands());
   for (const std::string& failure : study.failures()) text += "  " + failure + "\n";
+  for (const std::string& missing : study.not_shown()) text += "  not shown: " + missing + "\n";
+  if (study.is_interrupted()) text += "  not shown: what comes after the interruption\n";
   return text;
 }
 
@@ -151,7 +166,7 @@ std::string gate_text(const v1::Study& study) {
 std::string csv(const v1::Study& study) {
   std::string text =
       "problem,family,method,climbs,setting,error,energy_drift,joint_error_m,penetration_m,cpu_min_s,cpu_median_s,runs,"
-      "simulated_s,steps,derivatives,iterations,evaluations,failed,build,processor\n";
+      "simulated_s,steps,derivatives,iterations,evaluations,failed,hosting,build,processor\n";
   for (const v1::Problem& problem : study.problems())
     for (const v1::Ladder& ladder : problem.ladders())
       for (const v1::Rung& rung : ladder.rungs()) {
@@ -161,9 +176,9 @@ std::string csv(const v1::Study& study) {
                             csv_quoted(problem.name()), problem.family(), ladder.method(), ladder.climbs(),
                             rung.setting(), error, rung.energy_drift(), rung.joint_error(), rung.penetration(),
                             rung.cpu_min(), rung.cpu_median(), rung.runs(), problem.duration());
-        text += fmt::format("{},{},{},{:.0f},{},{},{}\n", rung.steps(), rung.derivatives(), rung.iterations(),
-                            evaluations(rung), csv_quoted(rung.failed()), csv_quoted(study.build()),
-                            csv_quoted(study.processor()));
+        text += fmt::format("{},{},{},{:.0f},{},{},{},{}\n", rung.steps(), rung.derivatives(), rung.iterations(),
+                            evaluations(rung), csv_quoted(rung.failed()), csv_quoted(rung.hosting()),
+                            csv_quoted(study.build()), csv_quoted(study.processor()));
       }
   return text;
 }
@@ -184,10 +199,11 @@ std::string page(const v1::Study& study) {
       "Errors are dimensionless: the largest of distances as shares of the problem's size, and of angles in rad.\n"
       "Columns 1e-3, 1e-6, 1e-9: CPU of the cheapest rung that is at least as good, in ms per simulated second;\n"
       "{} : none is. Order: the median slope of error against step. Achieved / requested: geometric mean over the\n"
-      "rungs of an accuracy. Hosting direct, one thread. Every run stands in `study.csv`, what failed included.\n"
+      "rungs of an accuracy. Hosting: {}; one thread. Every run stands in `study.csv`, what failed included.\n"
       "Diagrams: curves lead from the coarsest setting to the finest; hollow marks failed; in the grey band the\n"
       "reference itself is no better; dashed: slopes of the orders 1, 2, 4.\n\n",
-      study.is_interrupted() ? ", which was interrupted" : "", study.build(), study.processor(), kNone);
+      study.is_interrupted() ? ", which was interrupted" : "", study.build(), study.processor(), kNone,
+      hosting_text(study));
   text += "Gate: " + gate_text(study);
   for (const v1::Problem& problem : study.problems()) text += problem_section(problem);
   return text + profile_section(study) + stability_section(study) + failure_section(study);

@@ -44,6 +44,8 @@ enum class Fate {
   kDiesAtTenthCall,
   kDiesOfItsFirstCall,
   kDiesUnread,  // before it looks at its first request
+  kHangsAtFourthCall,
+  kHangs,
   kDoesNotStart,
   kLacksThreads  // to start
 };
@@ -54,6 +56,8 @@ enum class Fate {
   throw StageFault(fault);
 }
 
+[[noreturn]] void hang() { throw StageFault(FaultKind::kDeadline, "test", "it hung"); }
+
 class Mortal final : public Carrier {
  public:
   Mortal(std::unique_ptr<Carrier> plugins, Hosting hosting, Fate fate)
@@ -62,6 +66,7 @@ class Mortal final : public Carrier {
                           kernel::DerivativeSource* derivatives) override {
     ++calls_;
     if (fate_ == Fate::kDiesUnread) die(true);
+    if (fate_ == Fate::kHangs || (fate_ == Fate::kHangsAtFourthCall && calls_ == 4)) hang();
     if (fate_ == Fate::kDiesOfItsFirstCall || (fate_ == Fate::kDiesAtFourthCall && calls_ == 4) ||
         (fate_ == Fate::kDiesAtTenthCall && calls_ == 10))
       die(false);
@@ -471,6 +476,34 @@ TEST_F(Ladder, PoisonStaysPoisonWhenTheFallbackDoesNotStart) {
   }
   ASSERT_TRUE(world.fault());
   EXPECT_EQ(witness.verdicts, 1);
+}
+
+// It may be the machine that stands still, so the slot fails as often as it may; then what it was asked is kept.
+TEST_F(Ladder, ARequestThatHangsToTheEndIsKept) {
+  for (const bool has_fallback : {false, true}) {
+    WorldBuilder builder = world(0);
+    SlotDescription& solver = builder.description().solver;
+    if (has_fallback) solver.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(solver.plugins[0]);
+    std::vector<Fate> fates(SlotDescription::kBudget, Fate::kHangs);
+    fates[0] = Fate::kHangsAtFourthCall;
+    Environment world(builder.description(), starter(fates));
+    PoisonWitness witness;
+    world.set_commit_listener(&witness);
+    while (world.step_count() < kLadderSteps && world.step() == StepOutcome::kCommitted) {
+    }
+    EXPECT_EQ(world.step_count(), has_fallback ? kLadderSteps : 3U);
+    EXPECT_EQ(world.faults().size(), SlotDescription::kBudget);
+    EXPECT_EQ(witness.verdicts, 1);
+  }
+}
+
+TEST_F(Ladder, DeathsFromOutsideSayNothingOfTheRequestInTheEnd) {
+  std::vector<Fate> fates(SlotDescription::kBudget, Fate::kDiesUnread);
+  Environment world(Ladder::world(0).description(), starter(fates));
+  PoisonWitness witness;
+  world.set_commit_listener(&witness);
+  EXPECT_EQ(world.step(), StepOutcome::kPaused);
+  EXPECT_EQ(witness.verdicts, 0);
 }
 
 TEST_F(Ladder, AStandbyThatCannotBeStartedIsSaidAndTriedAgain) {

@@ -16,8 +16,11 @@
 #include "plugin_sdk/body.h"
 #include "services/run/figures.h"
 #include "services/run/session.h"
+#include "services/study/rung.h"
+#include "services/study/tables.h"
 #include "tests/paths.h"
 #include "tests/run_quietly.h"
+#include "tests/services/cli/program.h"
 
 namespace gravitas {
 namespace {
@@ -177,6 +180,59 @@ TEST(PythonForce, IsKilledAndStoppedFromOutside) {
     EXPECT_THAT(hurt.words, HasSubstr(std::string("\"ordered\": \"") + order));
   EXPECT_THAT(hurt.words, HasSubstr("fault nan of step 20 was not injected: the worker of a Command commits no orders "
                                     "itself; allowed, since they come from outside: kill, hang, stop"));
+}
+
+// Its text with another worker.
+std::string falling_with(const std::string& command) {
+  std::string scene = harness::read_file(kFolder + "falling_with_drag.gravitas");
+  const std::string worker = "force_drag.py";
+  return scene.replace(scene.find(worker), worker.size(), command);
+}
+
+// Nothing but its CPU: ten times 10 ms and more.
+TEST(PythonForce, CountsInAStudy) {
+  class Nothing final : public study::Measure {
+   public:
+    void look(const kernel::Environment&) override {}
+    double error() const override { return 0.0; }
+  };
+  const harness::ScratchFolder folder;
+  Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());
+  const study::Subject subject(folder.write("falling.gravitas", falling_with(in_shell(kFolder + "busy_drag.py"))),
+                               &catalog);
+  const auto rung_within = [&](double cpu_seconds) {
+    study::RunLimits limits;
+    limits.cpu_seconds = cpu_seconds;
+    limits.runs = 1;
+    return study::make_rung(
+        subject, {"Basic", "SemiImplicitEuler", "Sequential"}, {10, 1},
+        [](const auto&) { return std::make_unique<Nothing>(); }, limits);
+  };
+  study::v1::Study study;
+  study::v1::Rung& rung = *study.add_problems()->add_ladders()->add_rungs() = rung_within(100.0);
+  EXPECT_EQ(rung.failed(), "");
+  EXPECT_GE(rung.cpu_min(), 0.1);
+  EXPECT_EQ(rung.hosting(), "direct; grpc: PythonDrag");
+  EXPECT_THAT(study::page(study), HasSubstr("Hosting: direct; grpc: PythonDrag; one thread"));
+  const study::v1::Rung hurried = rung_within(0.05);
+  EXPECT_TRUE(hurried.too_long());
+  EXPECT_GE(hurried.cpu_min(), 0.05);
+}
+
+// Whoever dies of it the second time has said that it was read.
+TEST(PythonForce, ARequestThatKillsTwoWorkersIsKept) {
+  const harness::ScratchFolder folder;
+  for (const char* death : {"exit", "segv"}) {
+    folder.write("falling.gravitas", falling_with(in_shell(kFolder + "mortal_drag.py") + " " + death));
+    const std::string there = "cd " + in_shell(folder.path("")) + " && " + kGravitas;
+    const Ended run = ended(there + " run falling.gravitas --steps 30 --checkpoint kept");
+    EXPECT_EQ(run.code, 3) << run.words;
+    EXPECT_THAT(run.words, HasSubstr("paused at step 5: slot force, plugin PythonDrag: "));
+    EXPECT_THAT(run.words, testing::Not(HasSubstr("Failures")));
+    const Ended replay = ended(there + " replay falling.force.step6.capsule");
+    EXPECT_EQ(replay.code, 4) << replay.words;
+    EXPECT_THAT(replay.words, HasSubstr("1 failed again"));
+  }
 }
 
 TEST(PythonSolver, OrdersThatCannotComeFromOutsideAreRefused) {

@@ -85,6 +85,7 @@ class Call(Host):
         self.method, self.head, self._derivative = method, head, derivative
         self.outgoing = queue.SimpleQueue()
         self.incoming = queue.SimpleQueue()  # None: the kernel is gone
+        self.written = threading.Event()  # the first message that went out, or the kernel is gone
         self.rows = {}  # by their word, as the request has them
         self._marks, self._last_mark = 0, time.monotonic()
 
@@ -92,10 +93,11 @@ class Call(Host):
         self._send(Sent.REPLY, columns, outcome)
 
     def say_taken(self):
-        """Others failed at this request: whoever dies of it from here on has read it."""
+        """Others failed at this request: whoever dies of it from here on has read it, and the kernel can know."""
         if self.head.attempt > 0:
             self._marks += 1
             self._send(Sent.MARK, None, {"marks": self._marks})
+            self.written.wait()
 
     def mark_progress(self):
         self._marks += 1

@@ -154,10 +154,13 @@ class Worker(grpc.GenericRpcHandler):
             while kind is not Sent.REPLY:
                 kind, reply = call.outgoing.get()
                 yield reply
+                # gRPC comes back when that has gone out
+                call.written.set()
                 if kind is Sent.QUESTION:
                     call.incoming.put(next(requests, None))
         finally:
             # the plugin may wait for a kernel that is gone
+            call.written.set()
             call.incoming.put(None)
 
 

@@ -9,12 +9,14 @@
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
+#include <regex>
 #include <string>
 #include <vector>
 
 #include "services/run/session.h"
 #include "services/study/analysis.h"
 #include "services/study/diagram.h"
+#include "services/study/tables.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas::study {
@@ -28,6 +30,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 // Steps of 0.1 that halve, errors of an order, a cost that doubles.
 v1::Ladder ladder_of(const std::string& method, double order, double cost, int rungs = 8) {
@@ -122,19 +125,44 @@ TEST(StudyGate, FailsWhereOrderErrorOrWorkIsMissed) {
   EXPECT_THAT(failures_of(study, {What::kEvaluations, "top", "A", 1e-9, 80.0}),
               ElementsAre(HasSubstr("does not reach")));
 
-  // what was not run is not judged; a ladder that shows nothing is, unless it ran out of time
-  v1::Study other = study;
-  apply_gate({{What::kOrder, "top", "B", 1.8, 2.2}, {What::kOrder, "spin", "A", 1.8, 2.2}}, &other);
-  EXPECT_EQ(other.demands(), 0U);
-  // the built-in demands are none of a scene that is called like a shipped one
-  other.mutable_problems(0)->set_family("own");
-  apply_gate({{What::kError, "top", "A", 0.0, 1e-30, true}}, &other);
-  EXPECT_EQ(other.demands(), 0U);
   const v1::Study few = study_with({ladder_of("A", 2.0, 1.0, 3)});
   EXPECT_THAT(failures_of(few, {What::kOrder, "top", "A", 1.8, 2.2}), ElementsAre(HasSubstr("shows no order")));
-  v1::Study slow = few;
+}
+
+// What was not run far enough is neither met nor missed.
+TEST(StudyGate, IsNotPassedByWhatIsNotShown) {
+  using What = Demand::What;
+  const v1::Study study = study_with({ladder_of("A", 1.7, 1.0, 3)});
+  const auto verdict_of = [](v1::Study judged, const Demand& demand) {
+    apply_gate({demand}, &judged);
+    EXPECT_THAT(judged.failures(), IsEmpty());
+    EXPECT_EQ(is_passed(judged), judged.not_shown().empty() && !judged.is_interrupted());
+    EXPECT_EQ(summary(judged).find("is passed") != std::string::npos, is_passed(judged) && judged.demands() > 0);
+    return judged.not_shown().empty() ? std::to_string(judged.demands()) : judged.not_shown(0);
+  };
+  EXPECT_EQ(verdict_of(study, {What::kError, "top", "A", 0.0, 0.1}), "1");
+  EXPECT_EQ(verdict_of(study, {What::kOrder, "top", "B", 1.8, 2.2}), "top, B: it was not run");
+  EXPECT_EQ(verdict_of(study, {What::kOrder, "spin", "A", 1.8, 2.2}), "spin, A: it was not run");
+  // the built-in demands are none of what nobody chose, nor of a scene that is called like a shipped one
+  EXPECT_EQ(verdict_of(study, {What::kOrder, "spin", "A", 1.8, 2.2, true}), "0");
+  v1::Study own = study;
+  own.mutable_problems(0)->set_family("own");
+  EXPECT_EQ(verdict_of(own, {What::kError, "top", "A", 0.0, 1e-30, true}), "0");
+
+  v1::Study slow = study;
   slow.mutable_problems(0)->mutable_ladders(0)->mutable_rungs(2)->set_too_long(true);
-  EXPECT_THAT(failures_of(slow, {What::kOrder, "top", "A", 1.8, 2.2}), IsEmpty());
+  const std::string not_run = "; finer rungs were not run, since one took more CPU than it may";
+  EXPECT_EQ(verdict_of(slow, {What::kOrder, "top", "A", 1.8, 2.2}),
+            "top, A: its ladder shows no order; 1.8 to 2.2 is wanted" + not_run);
+  EXPECT_THAT(verdict_of(slow, {What::kError, "top", "A", 0.0, 1e-9}), HasSubstr(not_run));
+  EXPECT_EQ(verdict_of(slow, {What::kEvaluations, "top", "A", 1e-9, 80.0}),
+            "top, A: it does not reach an error of 1e-09" + not_run);
+
+  v1::Study ended = study;
+  ended.set_is_interrupted(true);
+  EXPECT_EQ(verdict_of(ended, {What::kError, "top", "A", 0.0, 0.1}), "1");
+  ended.mutable_problems(0)->mutable_ladders(0)->set_is_interrupted(true);
+  EXPECT_THAT(verdict_of(ended, {What::kOrder, "top", "A", 1.8, 2.2}), HasSubstr("; it was interrupted"));
 }
 
 TEST(StudyGate, FilesAreReadLineByLine) {
@@ -182,6 +210,42 @@ TEST(StudyDiagram, ShowsEveryRun) {
               AllOf(HasSubstr(with_circles + " (1 failed)"), HasSubstr("CPU s per simulated s"), HasSubstr("0.05 s")));
 }
 
+// Columns of marks that stand close together, each three times.
+TEST(StudyDiagram, LabelsCoverNeitherMarksNorEachOther) {
+  v1::Study study = study_with({});
+  for (int i = 0; i < 3; ++i) {
+    const double cost = 1.0 + 0.1 * i;
+    *study.mutable_problems(0)->add_ladders() = ladder_of("Basic/SemiImplicitEuler/Sequential", 0.01, cost);
+    *study.mutable_problems(0)->add_ladders() = ladder_of("Smooth/SymplecticSplitting4/Direct", 0.02, cost);
+    *study.mutable_problems(0)->add_ladders() = ladder_of("Substepping/Verlet/Newton", 0.03, cost);
+  }
+  const std::string drawing = diagram(study.problems(0));
+  struct Box {
+    double left, bottom, width;
+  };
+  std::vector<Box> labels;
+  const std::regex label("<text x=\"([0-9.]+)\" y=\"([0-9.]+)\" font-size=\"9\"[^>]*>([^<]+)<");
+  for (std::sregex_iterator one(drawing.begin(), drawing.end(), label), end; one != end; ++one)
+    labels.push_back({std::stod((*one)[1]), std::stod((*one)[2]), 5.0 * static_cast<double>((*one)[3].length())});
+  // both ends of a ladder, in both panels
+  EXPECT_EQ(labels.size(), 2U * 2U * 9U);
+  constexpr double kHigh = 8.0;
+  for (std::size_t i = 0; i < labels.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Box &a = labels[i], &b = labels[j];
+      EXPECT_FALSE(a.left < b.left + b.width && b.left < a.left + a.width && std::fabs(a.bottom - b.bottom) < kHigh)
+          << i << ", " << j;
+    }
+  const std::regex mark("<circle cx=\"([0-9.]+)\" cy=\"([0-9.]+)\"");
+  for (std::sregex_iterator one(drawing.begin(), drawing.end(), mark), end; one != end; ++one) {
+    const double x = std::stod((*one)[1]), y = std::stod((*one)[2]);
+    for (const Box& box : labels)
+      EXPECT_FALSE(box.left < x && x < box.left + box.width && box.bottom - kHigh < y && y < box.bottom)
+          << x << " " << y;
+  }
+  EXPECT_NE(drawing.find("stroke-width=\"0.6\""), std::string::npos);  // what leads to those that are far
+}
+
 // A method looks the same whatever stands beside it.
 TEST(StudyDiagram, MethodsLookTheSameInAll) {
   const std::string alone = diagram(study_with({ladder_of("Smooth/RK4/Direct", 2.0, 1.0)}).problems(0));
@@ -223,6 +287,10 @@ TEST(StudyProgram, WritesWhatItMeasuredAndFailsByItsGate) {
 
   words.back() = folder.write("gate", "error point_pendulum Smooth/RK4/Direct 0.1\n");
   EXPECT_EQ(run_program(words, folder).exit_code, 0);
+  words.back() = folder.write("gate", "error heavy_top Smooth/RK4/Direct 0.1\n");
+  result = run_program(words, folder);
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("heavy_top, Smooth/RK4/Direct: it was not run"));
 }
 
 TEST(StudyProgram, LeavesNothingBehindWhereItRefuses) {
@@ -253,6 +321,7 @@ TEST(StudyProgram, KeepsWhatItHasWhenInterrupted) {
   EXPECT_EQ(result.exit_code, 130) << result.err;
   EXPECT_THAT(result.err, HasSubstr("what was computed is kept"));
   EXPECT_THAT(read_file(out + "/study.csv"), HasSubstr("\nfour_bar,smooth,Smooth/RK4/Direct,"));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("the gate is not passed"), Not(HasSubstr("is passed"))));
 }
 
 }  // namespace
