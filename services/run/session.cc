@@ -165,8 +165,8 @@ class Run final : private kernel::CommitListener {
       if (is_unrepeatable_) return;
       try {
         if (!keeps && result_.outcome == RunOutcome::kPaused) keep_paused_state();
-      } catch (const BadInput& problem) {
-        result_.fault += fmt::format("; no checkpoint: {}", problem.what());
+      } catch (const std::runtime_error& problem) {
+        result_.fault += fmt::format("; no checkpoint could be written: {}", problem.what());
       }
       // also over one of this step: in the step that pauses a run others may have taken over
       if (keeps) recorder_->save_last(*environment_);
@@ -471,8 +471,9 @@ class Run final : private kernel::CommitListener {
     result_.fault = "paused at " + pause_text(description_, record, poisoned_step_ >= record.step);
   }
 
+  // A run that has paused stays that: what fails after it is said besides.
   void fail(const std::string& why) {
-    result_.outcome = RunOutcome::kFailed;
+    if (result_.outcome != RunOutcome::kPaused) result_.outcome = RunOutcome::kFailed;
     if (result_.fault.find(why) == std::string::npos) result_.fault += (result_.fault.empty() ? "" : "; ") + why;
   }
 
