@@ -356,7 +356,9 @@ TEST(BadInput, CommandsThatStartNoWorker) {
 TEST(BadInput, OptionsOfTheCommandLine) {
   const ScratchFolder folder;
   for (const auto& [option, expected] : std::vector<std::pair<std::vector<std::string>, std::string>>{
-           {{"--frobnicate"}, "--frobnicate"},
+           {{"--frobnicate"}, "there is no option \"--frobnicate\"; --help names those that there are\n"},
+           {{"--step=5"}, "there is no option \"--step\"; did you mean \"--steps\"? --help names"},
+           {{"-durations", "5"}, "there is no option \"-durations\"; did you mean \"--duration\"? --help names"},
            {{"--hosting", "cloud"}, "allowed: direct, shm, grpc"},
            {{"--hosting", "grpc:127.0.0.1:7000"}, "SLOT=grpc:ADDRESS"},
            {{"--hosting", "solver=grpc:192.0.2.1:7000"}, "no address of this machine"},
@@ -523,6 +525,9 @@ TEST(BadInput, AWordThatIsNoSubcommandIsNamed) {
            {{"ctl", "--socket", "x", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"},
            {{"--bogus"}, "there is no option \"--bogus\""},
            {{"ctl", "--bogus"}, "there is no option \"--bogus\""},
+           {{"ctl", "status", "--jsn"}, "there is no option \"--jsn\"; did you mean \"--json\"?"},
+           {{"describe", "--jsn"}, "there is no option \"--jsn\"; did you mean \"--json\"?"},
+           {{"campaign", "--sed", "1"}, "there is no option \"--sed\"; did you mean \"--seed\"?"},
            {{"ctl", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"}}) {
     const ProgramResult result = run_program(arguments, folder);
     EXPECT_EQ(result.exit_code, 2);
