@@ -117,7 +117,7 @@ int main(int argc, char** argv) {
   cli::add_study(&app, &action);
   cli::add_serve(&app, &action);
   cli::add_ctl(&app, &action);
-  cli::refuse_empty_values(&app);
+  cli::refuse_meaningless_values(&app);
   const std::vector<std::string> words(argv + 1, argv + argc);
   for (const std::string& problem : {unknown_subcommand(app, words), option_without_value(words)}) {
     if (problem.empty()) continue;

@@ -447,6 +447,24 @@ TEST(BadInput, EmptyValuesOfOptions) {
   }
 }
 
+// It named a file of that name.
+TEST(BadInput, ADashIsNoStandardStream) {
+  const ScratchFolder folder;
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"run", "-"}, {"run", kSample, "--trajectory", "-"}, {"replay", "-"}}) {
+    const ProgramResult result = run_program(arguments, folder);
+    EXPECT_EQ(result.exit_code, 2) << arguments.back();
+    EXPECT_THAT(result.err, HasSubstr(": \"-\"; allowed: a name; /dev/stdin is standard input, /dev/stdout standard"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder.path("-")));
+  // what is named instead is read and written
+  const std::string piped = "cat " + in_shell(kSample) + " | " + in_shell(in_build("/bin/gravitas")) +
+                            " run /dev/stdin --steps 2 --hosting direct --quiet --trajectory /dev/stdout | wc -l > " +
+                            in_shell(folder.path("lines"));
+  EXPECT_EQ(std::system(piped.c_str()), 0);
+  EXPECT_EQ(std::stoi(harness::read_file(folder.path("lines"))), 1 + 3 * 2);
+}
+
 TEST(BadInput, NumbersOfCampaign) {
   const ScratchFolder folder;
   for (const std::string option : {"--seed", "--trial", "--jobs"}) {
