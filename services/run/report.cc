@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "kernel/slot_host.h"
@@ -203,6 +205,16 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
     out->set_why(one.why);
   }
   return message;
+}
+
+void fold_warnings(report::v1::Report* report) {
+  std::map<std::string, int> times;
+  for (const std::string& warning : report->warnings()) ++times[warning];
+  report::v1::Report folded;
+  for (const std::string& warning : report->warnings())
+    if (const int all = std::exchange(times[warning], 0); all > 0)
+      folded.add_warnings(all > 1 ? fmt::format("{} ({} times)", warning, all) : warning);
+  report->mutable_warnings()->Swap(folded.mutable_warnings());
 }
 
 void settle_swaps(report::v1::Report* report) {

@@ -572,6 +572,7 @@ void Run::write_report() {
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
   name_orders(faults_, description_, report.steps(), true, &report);
   if (!edits_.made().empty()) report.add_warnings("times of stages and steps are those since the last edit");
+  fold_warnings(&report);
   write_stages(*environment_, &report);
   figures_->write(&report);
   if (!reactions_) return;

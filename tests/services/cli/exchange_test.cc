@@ -22,6 +22,7 @@ using harness::read_report;
 using harness::run_program;
 using harness::ScratchFolder;
 using ::testing::Contains;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 struct Outcome {
@@ -68,6 +69,17 @@ TEST(Exchange, AFaultThatCannotBeInjectedIsToldAsThat) {
   // nor does it cost a worker
   EXPECT_EQ(run.report.faults_size(), 0);
   EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+}
+
+// They were hundreds, and hid all others.
+TEST(Exchange, LinesOfAFloodAreOneWarningWithTheirCount) {
+  const Outcome run = run_sample({"--fault", "solver:flood,bytes=1e6@step=5"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+  EXPECT_LT(run.report.warnings_size(), 5);
+  EXPECT_THAT(run.report.warnings(),
+              Contains(ContainsRegex("^worker of slot solver: stdout: \\.{79} \\([0-9]+ times\\)$")));
+  EXPECT_THAT(run.report.warnings(), Contains(HasSubstr(" more bytes dropped")));
 }
 
 TEST(Exchange, ASwapToTheSamePluginOrAnotherHostingChangesNoBit) {
