@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
@@ -361,7 +362,7 @@ class Run final : private kernel::CommitListener {
     figures_->begin_again(environment_.get());
     give_orders();
     tell({EventKind::kEdit, environment_->step_count(), environment_->time()},
-         fmt::format("{} changes before step {}", edit->changes_size(), edit->step()));
+         fmt::format("{} before step {}", counted(edit->changes_size(), "change"), edit->step()));
     for (const std::uint32_t body : woken)
       tell({EventKind::kWake, environment_->step_count(), environment_->time(), body}, "");
     // last, as the edit is made: a disk may be full
@@ -381,8 +382,8 @@ class Run final : private kernel::CommitListener {
   void warn_of_orders_beyond_the_end() {
     const auto warn = [&](const char* option, std::uint32_t step) {
       if (step > description_.steps)
-        warnings_.push_back(
-            fmt::format("{} at step {} never comes: the run has {} steps", option, step, description_.steps));
+        warnings_.push_back(fmt::format("{} at step {} never comes: the run has {}", option, step,
+                                        counted(description_.steps, "step")));
     };
     for (const kernel::SwapOrder& order : swaps_) warn("--swap", order.step);
     for (const kernel::FaultInjection& fault : faults_) warn("--fault", fault.step);

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/near_miss.h"
 #include "services/run/session.h"
 #include "services/study/analysis.h"
@@ -112,8 +113,8 @@ std::vector<Demand> read_demands(const std::string& path, std::vector<std::strin
     for (std::size_t i = 0; i < known->numbers; ++i) rest >> numbers[i];
     std::string more;
     if (!rest || rest >> more || !(numbers[0] >= 0.0) || !(numbers[1] >= 0.0))
-      refuse(fmt::format("\"{}\"; allowed: {} PROBLEM METHOD and {} number{} >= 0", line, word, known->numbers,
-                         known->numbers == 1 ? "" : "s"));
+      refuse(
+          fmt::format("\"{}\"; allowed: {} PROBLEM METHOD and {} >= 0", line, word, counted(known->numbers, "number")));
     (known->numbers == 1 ? demand.high : demand.low) = numbers[0];
     if (known->numbers == 2) demand.high = numbers[1];
     if (demand.what == Demand::What::kOrder && demand.low > demand.high)

@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "plugin_sdk/counted.h"
 #include "services/recorder/csv.h"
 #include "services/study/analysis.h"
 
@@ -139,9 +140,9 @@ std::string stability_section(const v1::Study& study) {
 std::string gate_text(const v1::Study& study) {
   if (study.failures().empty())
     return study.demands() == 0 ? "the gate demands nothing of what was run\n"
-                                : fmt::format("the gate is passed: {} demands\n", study.demands());
+                                : "the gate is passed: " + counted(study.demands(), "demand") + "\n";
   // what has no reference fails, too
-  std::string text = fmt::format("the gate failed, of {} demands:\n", study.demands());
+  std::string text = "the gate failed, of " + counted(study.demands(), "demand") + ":\n";
   for (const std::string& failure : study.failures()) text += "  " + failure + "\n";
   return text;
 }

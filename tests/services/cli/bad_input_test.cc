@@ -129,7 +129,7 @@ const BadScene kBadScenes[] = {
      with_joint("Slider", "BindPoint = {0, 2, 0} Axis = {0, 1, 0}\nMotion = {{1, 0},\n{0.5, 1}}"), "8:1",
      "error: Slider \"J2\": Motion has the time 0.5 after 1; allowed: times that ascend"},
     {"course_of_times", with_joint("Slider", "BindPoint = {0, 2, 0} Axis = {0, 1, 0}\nMotion = {{1, 0}, {2}}"), "7:19",
-     "error: Slider \"J2\": a row of Motion has 1 numbers; allowed: a list of rows of 2 numbers"},
+     "error: Slider \"J2\": a row of Motion has 1 number; allowed: a list of rows of 2 numbers"},
     {"course_that_is_not_finite",
      with_joint("Slider", "BindPoint = {0, 2, 0} Axis = {0, 1, 0}\nMotion = {{1, 0}, {2, 1e999}}"), "7:23", "1e999"},
     {"crossed_distances",
