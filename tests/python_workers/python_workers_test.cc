@@ -18,6 +18,7 @@
 #include "services/run/session.h"
 #include "tests/paths.h"
 #include "tests/run_quietly.h"
+#include "tests/services/cli/program.h"
 
 namespace gravitas {
 namespace {
@@ -305,6 +306,30 @@ TEST(PythonKit, NonsenseIsNoRefusal) {
   const Ended mumbling = check("mumbling_drag.py");
   EXPECT_EQ(mumbling.code, 4) << mumbling.words;
   EXPECT_THAT(mumbling.words, HasSubstr("it answers with something else than Welcome or Refusal"));
+}
+
+// It was no declaration any more, and no word of why.
+TEST(PythonDeclaration, IsNotHiddenByWhatThePluginPrints) {
+  const harness::ScratchFolder folder;
+  const std::string worker =
+      folder.write("talking.py",
+                   "import sys\nprint('begins')\nsys.path.append('" + kFolder +
+                       "')\nfrom force_drag import Drag\nprint('has loaded', flush=True)\n"
+                       "from gravitas_worker import main\nmain(Drag)\n");
+  const Ended check = ended(kPython + " " + kGravitas + " check " + in_shell("/usr/bin/python3 -B " + in_shell(worker)) +
+                            " --case handshake/magic");
+  EXPECT_EQ(check.code, 0) << check.words;
+}
+
+TEST(PythonDeclaration, SaysWhichModulesAreMissingAndWhereTheyAre) {
+  const std::string check = " " + kGravitas + " check ", script = in_shell(kFolder + "force_drag.py");
+  const Ended none = ended(kPython + check + in_shell("/usr/bin/python3 -S " + script));
+  EXPECT_EQ(none.code, 2) << none.words;
+  EXPECT_THAT(none.words, HasSubstr("No module named 'numpy'; it needs Debian's packages python3-numpy, "));
+  const Ended lost = ended("PYTHONPATH=" + check + in_shell("/usr/bin/python3 " + script));
+  EXPECT_EQ(lost.code, 2) << lost.words;
+  EXPECT_THAT(lost.words, HasSubstr("No module named 'gravitas_worker'; PYTHONPATH must name the folder of the Python "
+                                    "SDK: " + in_shell(in_build("/lib/python"))));
 }
 
 }  // namespace

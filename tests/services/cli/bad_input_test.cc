@@ -342,7 +342,7 @@ TEST(BadInput, CommandsThatStartNoWorker) {
   const ScratchFolder folder;
   for (const auto& [command, expected] :
        std::vector<std::pair<std::string, std::string>>{{"false", "false --describe ended with status 1"},
-                                                        {"echo", "wrote no catalogue of 1 plugins"},
+                                                        {"echo", "wrote no catalogue of 1 plugin: its standard output"},
                                                         {"no-such-program", "No such file or directory"}}) {
     const std::string plugins =
         folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"solver\" Command = \"" + command + "\" } }");
