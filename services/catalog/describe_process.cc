@@ -141,7 +141,8 @@ std::string missing_module(const std::string& messages) {
            shell_word((bin.parent_path() / "lib" / "python").string());
   }
   if (lacks("numpy") || lacks("grpc") || lacks("google"))
-    return "; it needs Debian's packages python3-numpy, python3-grpcio and python3-protobuf, which /usr/bin/python3 finds";
+    return "; it needs Debian's packages python3-numpy, python3-grpcio and python3-protobuf, which /usr/bin/python3 "
+           "finds";
   return {};
 }
 

@@ -134,8 +134,7 @@ class DeskHost final : public capsule::ForwardingHost {
   template <class Condition>
   static void wait_while(Condition&& condition) {
     const auto until = Clock::now() + kEndPatience;
-    while (condition() && Clock::now() < until)
-      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    while (condition() && Clock::now() < until) std::this_thread::sleep_for(std::chrono::microseconds(200));
   }
 
   const bool commits_, is_elsewhere_;

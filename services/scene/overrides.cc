@@ -97,9 +97,10 @@ class Override {
     if (word == "Material") return with_id(scene_->mutable_materials()->mutable_material(), root, rest);
     if (word == "Force") return with_id(scene_->mutable_forces()->mutable_force(), root, rest);
     const std::string meant = with_its_beginning(std::string(word));
-    throw Refused{root.offset, "the path begins with \"" + std::string(word) + "\"; " +
-                                   (meant.empty() ? allowed_names(word, kRoots)
-                                                  : "did you mean \"" + meant + "\"? Allowed: " + quoted_names(kRoots))};
+    throw Refused{root.offset,
+                  "the path begins with \"" + std::string(word) + "\"; " +
+                      (meant.empty() ? allowed_names(word, kRoots)
+                                     : "did you mean \"" + meant + "\"? Allowed: " + quoted_names(kRoots))};
   }
 
   // What a path lacks that begins with a property of the simulator or an id: "Simulator.Duration", "Body.Ball01"; empty: it

@@ -312,12 +312,11 @@ TEST(PythonKit, NonsenseIsNoRefusal) {
 TEST(PythonDeclaration, IsNotHiddenByWhatThePluginPrints) {
   const harness::ScratchFolder folder;
   const std::string worker =
-      folder.write("talking.py",
-                   "import sys\nprint('begins')\nsys.path.append('" + kFolder +
-                       "')\nfrom force_drag import Drag\nprint('has loaded', flush=True)\n"
-                       "from gravitas_worker import main\nmain(Drag)\n");
-  const Ended check = ended(kPython + " " + kGravitas + " check " + in_shell("/usr/bin/python3 -B " + in_shell(worker)) +
-                            " --case handshake/magic");
+      folder.write("talking.py", "import sys\nprint('begins')\nsys.path.append('" + kFolder +
+                                     "')\nfrom force_drag import Drag\nprint('has loaded', flush=True)\n"
+                                     "from gravitas_worker import main\nmain(Drag)\n");
+  const Ended check = ended(kPython + " " + kGravitas + " check " +
+                            in_shell("/usr/bin/python3 -B " + in_shell(worker)) + " --case handshake/magic");
   EXPECT_EQ(check.code, 0) << check.words;
 }
 
@@ -329,7 +328,8 @@ TEST(PythonDeclaration, SaysWhichModulesAreMissingAndWhereTheyAre) {
   const Ended lost = ended("PYTHONPATH=" + check + in_shell("/usr/bin/python3 " + script));
   EXPECT_EQ(lost.code, 2) << lost.words;
   EXPECT_THAT(lost.words, HasSubstr("No module named 'gravitas_worker'; PYTHONPATH must name the folder of the Python "
-                                    "SDK: " + in_shell(in_build("/lib/python"))));
+                                    "SDK: " +
+                                    in_shell(in_build("/lib/python"))));
 }
 
 }  // namespace

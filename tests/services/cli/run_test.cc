@@ -274,14 +274,15 @@ TEST(Run, APauseWhoseCheckpointCannotBeWrittenIsAPauseAndSaysBoth) {
   const ProgramResult result = run_program(words, folder);
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.err, HasSubstr("paused at step 5: slot solver"));
-  EXPECT_THAT(result.err, HasSubstr("no checkpoint could be written: checkpoint 'two_spheres_motor.paused.checkpoint'"));
+  EXPECT_THAT(result.err,
+              HasSubstr("no checkpoint could be written: checkpoint 'two_spheres_motor.paused.checkpoint'"));
 }
 
 // Nor is it another end where an output fails, too.
 TEST(Run, APauseIsAPauseWhereAnOutputCannotBeWritten) {
   const ScratchFolder folder;
-  const ProgramResult result = run_program(
-      {"run", kSample, "--fault", "solver:kill@step=5,times=2", "--report", "/dev/full"}, folder);
+  const ProgramResult result =
+      run_program({"run", kSample, "--fault", "solver:kill@step=5,times=2", "--report", "/dev/full"}, folder);
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.err, HasSubstr("paused at step 5: slot solver"));
   EXPECT_THAT(result.err, HasSubstr("report '/dev/full': No space left on device"));
