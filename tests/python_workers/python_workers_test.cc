@@ -312,9 +312,9 @@ TEST(PythonKit, NonsenseIsNoRefusal) {
 TEST(PythonDeclaration, IsNotHiddenByWhatThePluginPrints) {
   const harness::ScratchFolder folder;
   const std::string worker =
-      folder.write("talking.py", "import sys\nprint('begins')\nsys.path.append('" + kFolder +
-                                     "')\nfrom force_drag import Drag\nprint('has loaded', flush=True)\n"
-                                     "from gravitas_worker import main\nmain(Drag)\n");
+      folder.write("talking.py", "import os\nimport sys\nsys.path.append('" + kFolder +
+                                     "')\nfrom force_drag import Drag\nfrom gravitas_worker import main\n"
+                                     "print('has loaded', flush=True)\nos.system('echo has started')\nmain(Drag)\n");
   const Ended check = ended(kPython + " " + kGravitas + " check " +
                             in_shell("/usr/bin/python3 -B " + in_shell(worker)) + " --case handshake/magic");
   EXPECT_EQ(check.code, 0) << check.words;
