@@ -8,6 +8,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/solver.h"
 
 namespace gravitas {
@@ -35,8 +36,8 @@ AnswerProblem check_unit(std::span<const double> column, std::size_t components,
 }  // namespace
 
 std::string too_long(const stage::ColumnInfo& column, std::uint64_t count, std::uint64_t capacity) {
-  return std::string("column ") + column.name + " is longer than its room: answered " + std::to_string(count) +
-         " numbers, room for " + std::to_string(capacity);
+  return std::string("column ") + column.name + " is longer than its room: answered " + counted(count, "number") +
+         ", room for " + std::to_string(capacity);
 }
 
 std::string overfull_column(std::span<const stage::ColumnInfo> infos, const gravitas_reply_column* reply) {
@@ -73,8 +74,8 @@ AnswerProblem check_remembered_contacts(std::span<const std::uint32_t> body, std
 AnswerProblem check_block_rows(const char* column, std::span<const std::uint32_t> block_body, std::uint64_t bodies,
                                std::uint64_t most) {
   if (block_body.size() > 2 * most)
-    return {true, std::string(column) + " has " + std::to_string(block_body.size() / 2) + " rows, " +
-                      std::to_string(most) + " are allowed"};
+    return {true, std::string(column) + " has " + counted(block_body.size() / 2, "row") +
+                      ", allowed: " + std::to_string(most)};
   const auto bad = std::ranges::find_if(block_body, [&](std::uint32_t body) { return body >= bodies; });
   if (bad == block_body.end()) return {};
   return bad_structure(column, static_cast<std::size_t>(bad - block_body.begin()) / 2,

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "plugin_sdk/counted.h"
+
 namespace gravitas {
 namespace {
 
@@ -35,8 +37,8 @@ std::string misfit(const stage::ColumnInfo& column, std::uint64_t count, const R
   const std::string name = std::string("column ") + column.name;
   if (column.rows_index == stage::kScalar) return name + " must be one value, has " + std::to_string(count);
   const std::uint64_t found = rows_found(column, count);
-  if (found == kUnknownRows) return name + " has " + std::to_string(count) + " elements, not a whole number of rows";
-  return name + " has " + std::to_string(found + column.extra) + " rows, expected " +
+  if (found == kUnknownRows) return name + " has " + counted(count, "element") + ", not a whole number of rows";
+  return name + " has " + counted(found + column.extra, "row") + ", expected " +
          std::to_string(rows[column.rows_index] + column.extra) + " (one per " + column.rows + ")";
 }
 

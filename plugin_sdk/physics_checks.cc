@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "plugin_sdk/body.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/pair_rule.h"
@@ -174,7 +175,8 @@ std::string PairCheck::check(const stage::SpacePairsRequest& request, std::span<
     }
   }
   if (wanted == pair.size() / 2) return {};
-  return std::to_string(pair.size() / 2) + " pairs are there, " + std::to_string(wanted) + " have overlapping bounds";
+  return counted(pair.size() / 2, "pair is there", "pairs are there") + ", " + counted(wanted, "has", "have") +
+         " overlapping bounds";
 }
 
 }  // namespace gravitas

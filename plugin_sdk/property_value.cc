@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/near_miss.h"
 
@@ -125,8 +126,8 @@ bool take_table(const Property& declared, const PropertyValue& given, std::vecto
     if (!take_row(declared, row, out, problems)) return false;
     if (out->size() - before != declared.columns) {
       return wrong(row,
-                   "a row of " + declared.name + " has " + std::to_string(out->size() - before) +
-                       " numbers; allowed: " + allowed_values(declared),
+                   "a row of " + declared.name + " has " + counted(out->size() - before, "number") +
+                       "; allowed: " + allowed_values(declared),
                    problems);
     }
     if (!is_over_time(declared)) continue;

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "plugin_sdk/counted.h"
+
 namespace gravitas {
 
 class SlowCalls {
@@ -26,7 +28,7 @@ class SlowCalls {
   // What is to be said of the slow ones since the last time; empty: there were none.
   std::string take_complaint() {
     if (count_ == 0) return {};
-    return "it was slow " + std::to_string(std::exchange(count_, 0)) + " times: up to " +
+    return "it was slow " + counted(std::exchange(count_, 0), "time") + ": up to " +
            std::to_string(std::exchange(slowest_, 0) / 1'000'000) + " ms, over " + std::to_string(kFactor) +
            " times as long as it usually takes";
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/printable.h"
 
 namespace gravitas::channel {
@@ -72,7 +73,7 @@ std::vector<std::string> ProcessOutput::take() {
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     streams_[i].held = 0;
     if (const std::uint64_t dropped = std::exchange(streams_[i].dropped, 0); dropped > 0)
-      lines_.push_back(kPrefix[i] + ("... and " + std::to_string(dropped) + " more bytes dropped"));
+      lines_.push_back(kPrefix[i] + ("... and " + counted(dropped, "more byte") + " dropped"));
   }
   return std::exchange(lines_, {});
 }

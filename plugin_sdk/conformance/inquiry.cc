@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas::conformance {
@@ -42,7 +43,7 @@ std::string text_of(T number) {
 template <typename T>
 std::string first_difference(std::span<const T> came, std::span<const T> right) {
   if (came.size() != right.size())
-    return "has " + std::to_string(came.size()) + " numbers, should have " + std::to_string(right.size());
+    return "has " + counted(came.size(), "number") + ", should have " + std::to_string(right.size());
   for (std::size_t i = 0; i < came.size(); ++i)
     if (!(came[i] == right[i]))
       return "number " + std::to_string(i) + " is " + text_of(came[i]) + ", should be " + text_of(right[i]) +

@@ -23,6 +23,8 @@
 #include <thread>
 #include <vector>
 
+#include "plugin_sdk/counted.h"
+
 namespace gravitas::host {
 namespace {
 
@@ -173,7 +175,7 @@ std::string use_up_descriptors() {
   }
   std::size_t count = 0;
   while (dup(STDERR_FILENO) >= 0) ++count;
-  return "opened " + std::to_string(count) + " descriptors: " + std::strerror(errno);
+  return "opened " + counted(count, "descriptor") + ": " + std::strerror(errno);
 }
 
 std::string flood(std::size_t bytes) {
@@ -187,7 +189,7 @@ std::string flood(std::size_t bytes) {
     if (taken < 0) break;
     written += static_cast<std::size_t>(taken);
   }
-  const std::string text = "wrote " + std::to_string(written) + " bytes";
+  const std::string text = "wrote " + counted(written, "byte");
   return written < bytes ? outcome(text, false) : text;
 }
 

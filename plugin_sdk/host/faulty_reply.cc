@@ -7,6 +7,8 @@
 #include <limits>
 #include <string_view>
 
+#include "plugin_sdk/counted.h"
+
 namespace gravitas::host {
 namespace {
 
@@ -70,8 +72,7 @@ std::string change_numbers(const FaultOrder& order, const stage::MethodInfo& met
   const std::uint64_t rows = rows_of(info, reply[index]);
   const bool all = order.word("all") == "1";
   const std::uint64_t first = all ? 0 : order.gives("row") ? static_cast<std::uint64_t>(order.number("row")) : rows / 2;
-  if (first >= rows)
-    return name + " has " + std::to_string(rows) + " rows, and none with number " + std::to_string(first);
+  if (first >= rows) return name + " has " + counted(rows, "row") + ", and none with number " + std::to_string(first);
   const std::uint64_t end = all ? rows : first + 1;
   double* numbers = static_cast<double*>(reply[index].data);
   for (std::uint64_t i = first * info.components; i < end * info.components; ++i)

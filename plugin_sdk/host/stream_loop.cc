@@ -10,6 +10,7 @@
 #include "plugin_sdk/answer_checks.h"
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/host/fault_injection.h"
 #include "schemas/wire/byte_buffer.h"
 
@@ -310,7 +311,7 @@ void StreamLoop::answer(Stream* stream, const Call& call, FaultInjection* fault)
     for (std::size_t i = 0; i < method.reply.size() && end.status == GRAVITAS_NEEDS_CAPACITY; ++i) {
       if (stream->reply[i].count <= wire::kMostElements) continue;
       end.status = GRAVITAS_FAILED;
-      end.text = std::string("it asks for room for ") + std::to_string(stream->reply[i].count) + " numbers in column " +
+      end.text = std::string("it asks for room for ") + counted(stream->reply[i].count, "number") + " in column " +
                  method.reply[i].name;
       stream->reply[i].count = 0;
     }

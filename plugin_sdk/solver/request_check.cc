@@ -8,6 +8,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver.h"
@@ -25,8 +26,8 @@ constexpr double kUnitTolerance = 1e-6;
 template <typename T>
 void check_length(const char* column, std::span<const T> values, std::size_t rows, std::size_t components) {
   if (values.size() == rows * components) return;
-  throw Refusal(std::string(column) + ": " + std::to_string(values.size()) + " numbers where " + std::to_string(rows) +
-                " rows of " + std::to_string(components) + " belong");
+  throw Refusal(std::string(column) + ": " + counted(values.size(), "number") + " where " + counted(rows, "row") +
+                " of " + std::to_string(components) + " belong");
 }
 
 // A column of finite numbers, none below `least`.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "plugin_sdk/counted.h"
 #include "services/recorder/svg.h"
 
 namespace gravitas::campaign {
@@ -56,13 +57,14 @@ std::string page(const v1::Table& table, const Tally& tally) {
       "body{{font:15px sans-serif;margin:2em}} table{{border-collapse:collapse}} "
       "td,th{{border:1px solid #ccc;padding:4px 10px;text-align:right}} th:first-child,td:first-child"
       "{{text-align:left}} text{{font:11px sans-serif}}</style></head><body>\n"
-      "<h1>Fault campaign: {}</h1>\n<p>{} faults injected, {} manifested, in {} trials; {} tier, seed {}, {:.1f} s. {}"
+      "<h1>Fault campaign: {}</h1>\n<p>{} injected, {} manifested, in {}; {} tier, seed {}, {:.1f} s. {}"
       "</p>\n",
-      table.forbidden() == 0 ? "nothing forbidden happened" : "something forbidden happened", table.injected(),
-      table.manifested(), table.trials(), table.tier(), table.seed(), table.seconds(),
+      table.forbidden() == 0 ? "nothing forbidden happened" : "something forbidden happened",
+      counted(table.injected(), "fault"), table.manifested(), counted(table.trials(), "trial"), table.tier(),
+      table.seed(), table.seconds(),
       table.forbidden() == 0
           ? fmt::format("With 95 % confidence at most {:.2g} of faults end so.", table.forbidden_bound())
-          : fmt::format("{} trials with a forbidden end.", table.forbidden()));
+          : counted(table.forbidden(), "trial") + " with a forbidden end.");
   html +=
       "<table><tr><th>group</th><th>injected</th><th>masked</th><th>recovered, bit for bit</th><th>fallback</th>"
       "<th>paused, resumable</th><th>needs re-run</th><th>not caught</th><th>forbidden</th></tr>\n";
@@ -76,10 +78,11 @@ std::string page(const v1::Table& table, const Tally& tally) {
   if (table.tier() == "real") {
     html += fmt::format(
         "<h2>From noticing a failure to the good answer</h2>\n<p>Green: a standby answered, median {:.0f} us, p99 "
-        "{:.0f} us, {} times. Blue: a cold start, median {:.0f} us, p99 {:.0f} us, {} times. Swaps paused the "
+        "{:.0f} us, {}. Blue: a cold start, median {:.0f} us, p99 {:.0f} us, {}. Swaps paused the "
         "simulation for {:.0f} us (median of {}).</p>\n",
-        table.standby().median(), table.standby().p99(), table.standby().count(), table.cold_start().median(),
-        table.cold_start().p99(), table.cold_start().count(), table.swap_pause().median(), table.swap_pause().count());
+        table.standby().median(), table.standby().p99(), counted(table.standby().count(), "time"),
+        table.cold_start().median(), table.cold_start().p99(), counted(table.cold_start().count(), "time"),
+        table.swap_pause().median(), table.swap_pause().count());
     html += histogram(tally.standby(), tally.cold_start());
   }
   if (!table.failures().empty()) html += "<h2>To see each again</h2>\n<pre>";

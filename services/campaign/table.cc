@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "plugin_sdk/counted.h"
+
 namespace gravitas::campaign {
 namespace {
 
@@ -98,20 +100,20 @@ std::string table_text(const v1::Table& table) {
     text += fmt::format("{:<10} {:>9} {:>9} {:>10} {:>9} {:>7} {:>13} {:>11} {:>10}\n", row.group(), row.injected(),
                         row.masked(), row.recovered(), row.fallback(), row.paused(), row.needs_rerun(),
                         row.not_caught(), row.forbidden());
-  text +=
-      fmt::format("\n{} faults injected, {} manifested, in {} trials ({} tier, seed {}) and {:.1f} s\n",
-                  table.injected(), table.manifested(), table.trials(), table.tier(), table.seed(), table.seconds());
+  text += fmt::format("\n{} injected, {} manifested, in {} ({} tier, seed {}) and {:.1f} s\n",
+                      counted(table.injected(), "fault"), table.manifested(), counted(table.trials(), "trial"),
+                      table.tier(), table.seed(), table.seconds());
   text += table.forbidden() == 0
               ? fmt::format("nothing forbidden happened: with 95 % confidence at most {:.2g} of faults\n",
                             table.forbidden_bound())
-              : fmt::format("{} trials with something forbidden\n", table.forbidden());
+              : counted(table.forbidden(), "trial") + " with something forbidden\n";
   if (table.wrong_values() > 0)
     text += fmt::format("{} of {} wrong values were not noticed without an ordered re-run ({:.3g} %; {:g} % may be)\n",
                         table.not_caught(), table.wrong_values(),
                         100.0 * static_cast<double>(table.not_caught()) / static_cast<double>(table.wrong_values()),
                         100.0 * kMayEscape);
   if (table.unprovoked() > 0)
-    text += fmt::format("{} failed calls besides, which no fault explains{}\n", table.unprovoked(),
+    text += fmt::format("{} besides, which no fault explains{}\n", counted(table.unprovoked(), "failed call"),
                         table.tier() == "real" ? " (a busy machine's deadlines)" : "");
   for (const std::string& one : table.unexplained()) text += "  " + one + "\n";
   if (table.logged() > 0 && table.tier() != "real")

@@ -12,10 +12,14 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <utility>
 
+#include "kernel/carrier/carrier.h"
 #include "plugin_sdk/channel/process_output.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/printable.h"
+#include "plugin_sdk/shell_word.h"
 
 extern char** environ;
 
@@ -126,6 +130,29 @@ std::string last_line(const std::string& messages) {
   return ": " + printable(messages.substr(begin, std::min(end + 1 - begin, kShownCharacters)));
 }
 
+// What a plugin in Python lacks, by the error that its interpreter ends with.
+std::string missing_module(const std::string& messages) {
+  const auto lacks = [&](const char* module) {
+    return messages.find(std::string("No module named '") + module) != std::string::npos;
+  };
+  if (lacks("gravitas")) {
+    const std::filesystem::path bin = std::filesystem::path(kernel::worker_program()).parent_path();
+    return "; PYTHONPATH must name the folder of the Python SDK: " +
+           shell_word((bin.parent_path() / "lib" / "python").string());
+  }
+  if (lacks("numpy") || lacks("grpc") || lacks("google"))
+    return "; it needs Debian's packages python3-numpy, python3-grpcio and python3-protobuf, which /usr/bin/python3 "
+           "finds";
+  return {};
+}
+
+// What stands where the catalogue should.
+std::string first_line(const std::string& bytes) {
+  if (bytes.empty()) return "it wrote nothing";
+  return "its standard output, which is the catalogue's alone, begins with \"" +
+         printable(bytes.substr(0, std::min(bytes.find('\n'), kShownCharacters))) + '"';
+}
+
 // `what` stands for the program in messages. `was_killed`: by a signal. Libraries are each looked at in a process of their own,
 // so that it came from outside, which says nothing about them.
 bool describe_once(const std::string& what, const std::vector<std::string>& words, int entries,
@@ -155,9 +182,10 @@ bool describe_once(const std::string& what, const std::vector<std::string>& word
   } else if (WIFSIGNALED(status)) {
     *problem = what + " --describe was ended by signal " + std::to_string(WTERMSIG(status)) + last_line(messages);
   } else if (WEXITSTATUS(status) != 0) {
-    *problem = what + " --describe ended with status " + std::to_string(WEXITSTATUS(status)) + last_line(messages);
+    *problem = what + " --describe ended with status " + std::to_string(WEXITSTATUS(status)) + last_line(messages) +
+               missing_module(messages);
   } else if (!answer->ParseFromString(bytes) || answer->entries_size() != entries) {
-    *problem = what + " --describe wrote no catalogue of " + std::to_string(entries) + " plugins";
+    *problem = what + " --describe wrote no catalogue of " + counted(entries, "plugin") + ": " + first_line(bytes);
   } else {
     return true;
   }

@@ -6,6 +6,8 @@
 #include <cstring>
 #include <string_view>
 
+#include "plugin_sdk/counted.h"
+
 namespace gravitas::check {
 
 using conformance::Question;
@@ -50,8 +52,9 @@ std::vector<AbusedRequest> with_uneven_rows(const Question& question) {
   const std::vector<std::uint64_t> counts = question.request.counts();
   std::vector<AbusedRequest> abused;
   const auto add = [&](std::size_t column, std::uint64_t count) {
-    abused.push_back({fmt::format("column {} with {} numbers instead of {}", infos[column].name, count, counts[column]),
-                      question.request});
+    abused.push_back(
+        {fmt::format("column {} with {} instead of {}", infos[column].name, counted(count, "number"), counts[column]),
+         question.request});
     set_count(&abused.back().request, column, count);
   };
   for (std::size_t i = 0; i < infos.size(); ++i) {

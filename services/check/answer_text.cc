@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/property_value.h"
 
 namespace gravitas::check {
@@ -55,7 +56,7 @@ std::string difference(stage::Method method, const conformance::Answer& first, c
   const stage::ColumnInfo& info = *found->column;
   const std::size_t i = found->column - stage::method_info(method).reply.data();
   const gravitas_column a = first.columns.plain()[i], b = second.columns.plain()[i];
-  if (!found->number) return fmt::format("column {} had {} numbers, then {}", info.name, a.count, b.count);
+  if (!found->number) return fmt::format("column {} had {}, then {}", info.name, counted(a.count, "number"), b.count);
   return fmt::format("number {} of column {} was {}, then {}", *found->number, info.name,
                      element_text(info, a.data, *found->number), element_text(info, b.data, *found->number));
 }

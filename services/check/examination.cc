@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/declaration_check.h"
 #include "plugin_sdk/shell_word.h"
 #include "services/check/answer_text.h"
@@ -300,7 +301,7 @@ std::vector<CheckCase> numbers_cases(const PluginDeclaration& declaration) {
       if (finding.empty() && subject.faults() != faults) finding = subject.last_fault();
       examination.blamed_call = subject.last_call();
       if (!finding.empty() && calls > 0 && passes_alone(one, examination))
-        finding += fmt::format("; only after {} calls in one process: alone this case passes", calls);
+        finding += fmt::format("; only after {} in one process: alone this case passes", counted(calls, "call"));
       return finding;
     };
     cases.push_back({Level::kNumbers, one.name, one.claim, judge});

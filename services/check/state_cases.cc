@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "plugin_sdk/conformance/sample_values.h"
+#include "plugin_sdk/counted.h"
 #include "services/check/answer_text.h"
 #include "services/check/examination.h"
 
@@ -65,9 +66,9 @@ std::string judge_chains(Examination& examination) {
       const std::string differs = difference(question->method, kept[step], lost[step]);
       if (!differs.empty())
         return fmt::format(
-            "'{}', continued {} times from its own answers: in one process, then with a new process for "
+            "'{}', continued {} from its own answers: in one process, then with a new process for "
             "each call: {}",
-            question->name, step, differs);
+            question->name, counted(step, "time"), differs);
     }
   }
   return {};
@@ -82,8 +83,8 @@ std::string judge_killed(Examination& examination) {
     subject->kill();
     if (differs.empty()) continue;
     examination.blamed_call = subject->last_call();
-    return fmt::format("'{}' in one process after {} others, then in a process of its own: {}", question.name, i,
-                       differs);
+    return fmt::format("'{}' in one process after {}, then in a process of its own: {}", question.name,
+                       counted(i, "other"), differs);
   }
   return {};
 }
@@ -93,8 +94,8 @@ std::string judge_declared(Examination& examination) {
   if (declaration.slot != Slot::kIntegrator || has_capability(declaration, "plugin_state")) return {};
   for (const Answer& answer : examination.answers())
     if (const std::size_t size = answer.columns.f64("plugin_state").size(); size > 0)
-      return fmt::format("it answers {} numbers of plugin_state and does not declare the capability plugin_state",
-                         size);
+      return fmt::format("it answers {} of plugin_state and does not declare the capability plugin_state",
+                         counted(size, "number"));
   return {};
 }
 

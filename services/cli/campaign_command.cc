@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "plugin_sdk/counted.h"
 #include "services/campaign/campaign.h"
 #include "services/campaign/endurance.h"
 #include "services/campaign/table.h"
@@ -58,10 +59,10 @@ int endure(const CampaignArguments& arguments) {
         result.max_step_us, result.problem.empty());
   } else {
     std::cout << fmt::format(
-        "{} steps at 1 kHz with {} kills ({} failed calls) in {:.1f} s; a step: median {:.0f} us, p99 {:.0f} us, "
+        "{} at 1 kHz with {} ({}) in {:.1f} s; a step: median {:.0f} us, p99 {:.0f} us, "
         "max {:.0f} us\n{}\n",
-        result.steps, result.kills, result.failures, result.seconds, result.median_step_us, result.p99_step_us,
-        result.max_step_us,
+        counted(result.steps, "step"), counted(result.kills, "kill"), counted(result.failures, "failed call"),
+        result.seconds, result.median_step_us, result.p99_step_us, result.max_step_us,
         result.problem.empty() ? "the chain of hashes is that of the quiet run" : "failed: " + result.problem);
   }
   if (!result.problem.empty()) return kExaminedFailed;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "plugin_sdk/counted.h"
 #include "services/capsule/capsule.h"
 #include "services/capsule/recording_host.h"
 #include "services/capsule/replay.h"
@@ -60,8 +61,8 @@ int capture(CaptureLine* line) {
     return kOurFault;
   }
   writer->close();
-  std::cout << fmt::format("{}: {} calls of slot {} in {} steps\n", line->options.capsule, writer->calls(), line->slot,
-                           result.report.steps());
+  std::cout << fmt::format("{}: {} of slot {} in {}\n", line->options.capsule, counted(writer->calls(), "call"),
+                           line->slot, counted(result.report.steps(), "step"));
   if (writer->calls() == 0 && tape.first_step > result.report.steps()) {
     std::cerr << fmt::format("gravitas: --from-step {}: the run ended after step {}\n", tape.first_step,
                              result.report.steps());
@@ -95,7 +96,7 @@ std::string closeness(const report::v1::ReplayReport& report) {
 void print_findings(const report::v1::ReplayReport& report) {
   if (!report.note().empty()) std::cerr << fmt::format("capsule '{}': {}\n", report.capsule(), report.note());
   if (report.left_out() > 0)
-    std::cout << fmt::format("{} calls left out, as {}\n", report.left_out(),
+    std::cout << fmt::format("{} left out, as {}\n", counted(report.left_out(), "call"),
                              fmt::join(report.left_out_because(), "; "));
   if (!report.remark().empty()) std::cout << report.remark() << '\n';
   if (report.has_first())
@@ -144,8 +145,8 @@ int replay(ReplayLine* line) {
   } else {
     for (const std::string& plugin : report.plugins()) std::cout << plugin << '\n';
     print_solutions(report);
-    std::cout << fmt::format("{} calls: {} same{}, {} different", report.calls(), report.same(), closeness(report),
-                             report.different());
+    std::cout << fmt::format("{}: {} same{}, {} different", counted(report.calls(), "call"), report.same(),
+                             closeness(report), report.different());
     if (report.failed_again() > 0) std::cout << fmt::format(", {} failed again", report.failed_again());
     if (report.answered_now() > 0)
       std::cout << fmt::format(", {} failed then and are answered now", report.answered_now());
@@ -171,7 +172,7 @@ int bisect(ReplayLine* line) {
   if (line->json) {
     std::cout << to_json(report, JsonForm::kPage);
   } else {
-    std::cout << fmt::format("{} calls answered alike{}", report.same(), closeness(report));
+    std::cout << fmt::format("{} answered alike{}", counted(report.same(), "call"), closeness(report));
     if (report.failed_again() > 0) std::cout << fmt::format(", {} failed alike", report.failed_again());
     std::cout << (report.different() == 0 ? "\n" : ", then a difference\n");
     print_findings(report);

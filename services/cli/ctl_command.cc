@@ -7,6 +7,7 @@
 #include <iostream>
 #include <memory>
 
+#include "plugin_sdk/counted.h"
 #include "services/cli/commands.h"
 #include "services/cli/option_checks.h"
 #include "services/cli/query_text.h"
@@ -180,8 +181,8 @@ int capture_calls(const CtlLine& line, ControlClient* client) {
   if (line.json) {
     std::cout << to_json(captured, JsonForm::kPage);
   } else {
-    std::cout << fmt::format("{}: {} calls of slot {} in {} steps from step {} on\n", line.out, captured.calls(),
-                             line.text, captured.steps(), captured.first_step());
+    std::cout << fmt::format("{}: {} of slot {} in {} from step {} on\n", line.out, counted(captured.calls(), "call"),
+                             line.text, counted(captured.steps(), "step"), captured.first_step());
   }
   if (captured.steps() == line.captured_steps) return kDone;
   if (interrupted()) return kInterrupted;

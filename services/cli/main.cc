@@ -35,14 +35,20 @@ std::string unknown_subcommand(const CLI::App& app, const std::vector<std::strin
   return {};
 }
 
-// Instead of the sub-command that is missing: what could not be one; empty: nothing is there.
+// What nothing takes: an option, or what stands instead of the sub-command that is missing; empty: nothing.
 std::string unexpected_word(const CLI::App& app) {
   const CLI::App* command = &app;
   while (!command->get_subcommands().empty()) command = command->get_subcommands()[0];
   const std::vector<std::string> words = app.remaining(true);
-  if (words.empty() || command->get_subcommands(nullptr).empty()) return {};
-  if (words[0].starts_with('-')) return "there is no option \"" + words[0] + "\"; --help names those that there are";
-  return unknown_subcommand(*command, words);
+  if (words.empty()) return {};
+  if (!words[0].starts_with('-')) return unknown_subcommand(*command, words);
+  const std::string option = words[0].substr(0, words[0].find('='));
+  std::vector<std::string> names;
+  for (const CLI::Option* one : command->get_options())
+    for (const std::string& name : one->get_lnames()) names.push_back("--" + name);
+  const std::string nearest = gravitas::nearest_name(option, names);
+  return "there is no option \"" + option + "\"; " + (nearest.empty() ? "" : "did you mean \"" + nearest + "\"? ") +
+         "--help names those that there are";
 }
 
 // Workers of many slots, with their standbys, take more files than shells allow at first.
@@ -111,7 +117,7 @@ int main(int argc, char** argv) {
   cli::add_study(&app, &action);
   cli::add_serve(&app, &action);
   cli::add_ctl(&app, &action);
-  cli::refuse_empty_values(&app);
+  cli::refuse_meaningless_values(&app);
   const std::vector<std::string> words(argv + 1, argv + argc);
   for (const std::string& problem : {unknown_subcommand(app, words), option_without_value(words)}) {
     if (problem.empty()) continue;
@@ -121,8 +127,9 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    const bool is_missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
-    if (const std::string word = is_missing ? unexpected_word(app) : ""; !word.empty()) {
+    const bool may_be_unexpected = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr ||
+                                   dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    if (const std::string word = may_be_unexpected ? unexpected_word(app) : ""; !word.empty()) {
       std::cerr << "gravitas: " << word << '\n';
       return cli::kBadInput;
     }

@@ -76,13 +76,17 @@ CLI::Validator positive_seconds() {
       "a finite number of seconds > 0");
 }
 
-void refuse_empty_values(CLI::App* app) {
-  for (CLI::Option* option : app->get_options())
-    if (option->get_items_expected_max() > 0)
-      option->check(check_of([](const std::string& text) { return !text.empty(); },
-                             option->get_positional() ? "a value that is not empty"
-                                                      : "a value that is not empty, or leave the option out"));
-  for (CLI::App* command : app->get_subcommands(nullptr)) refuse_empty_values(command);
+void refuse_meaningless_values(CLI::App* app) {
+  for (CLI::Option* option : app->get_options()) {
+    if (option->get_items_expected_max() == 0) continue;
+    option->check(check_of(
+        [](const std::string& text) { return !text.empty(); },
+        option->get_positional() ? "a value that is not empty" : "a value that is not empty, or leave the option out"));
+    option->check(
+        check_of([](const std::string& text) { return text != "-"; },
+                 "a name; /dev/stdin is standard input, /dev/stdout standard output, ./- a file of this name"));
+  }
+  for (CLI::App* command : app->get_subcommands(nullptr)) refuse_meaningless_values(command);
 }
 
 }  // namespace gravitas::cli

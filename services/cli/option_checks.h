@@ -23,7 +23,8 @@ CLI::Validator seconds_between(double least, double most);
 // A number of seconds > 0.
 CLI::Validator positive_seconds();
 
-// No option of a command or its sub-commands takes an empty value: it would count as one that is left out.
-void refuse_empty_values(CLI::App* app);
+// No option of a command or its sub-commands takes an empty value, which would count as one that is left out, nor "-", which
+// other programs take for a standard stream.
+void refuse_meaningless_values(CLI::App* app);
 
 }  // namespace gravitas::cli

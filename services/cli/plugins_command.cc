@@ -9,6 +9,7 @@
 #include "plugin_sdk/host/description_message.h"
 #include "plugin_sdk/near_miss.h"
 #include "services/catalog/catalog.h"
+#include "services/check/describe.h"
 #include "services/cli/commands.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
@@ -67,8 +68,8 @@ void print_properties(const std::vector<Property>& properties, const Change& cha
 void print_declaration(const InstalledPlugin& plugin) {
   const PluginDeclaration& d = plugin.declaration;
   std::cout << fmt::format(
-      "{} {}: slot {}\n  {}\n  library       {}\n  capabilities  {}\n", d.name, d.version, slot_name(d.slot), d.meaning,
-      plugin.library,
+      "{} {}: slot {}\n  {}\n  {:<12}  {}\n  capabilities  {}\n", d.name, d.version, slot_name(d.slot), d.meaning,
+      plugin.command.empty() ? "library" : "command", plugin.command.empty() ? plugin.library : plugin.command,
       d.capabilities.empty() ? std::string("none") : fmt::format("{}", fmt::join(d.capabilities, ", ")));
   if (d.slot == Slot::kIntegrator) std::cout << fmt::format("  theta         {:g}\n", d.theta);
   if (!d.properties.empty()) {
@@ -116,10 +117,12 @@ int describe(const std::string& name, bool json) {
   Catalog catalog = installed_catalog();
   std::vector<InstalledPlugin> found;
   std::string problem;
-  if (name.find('/') != std::string::npos || name.ends_with(".so")) {
-    if (const InstalledPlugin* plugin = catalog.add_library(name, &problem)) found.push_back(*plugin);
-    problem = fmt::format("'{}': {}; allowed: the path of a plugin library, or the name of a plugin or a type", name,
-                          problem);
+  if (name.find_first_of("/ ") != std::string::npos || name.ends_with(".so")) {
+    const check::Examinee examinee = check::find_examinee(name);
+    const InstalledPlugin* plugin = examinee.is_command() ? catalog.add_command(examinee.command, &problem)
+                                                          : catalog.add_library(examinee.library, &problem);
+    if (plugin != nullptr) found.push_back(*plugin);
+    problem = fmt::format("'{}': {}", name, problem);
   } else {
     // names are unique inside a slot only; a type's name stands for the plugin that serves it
     for (const InstalledPlugin& plugin : catalog.plugins())
@@ -165,10 +168,14 @@ void add_plugins(CLI::App* app, Action* action) {
 void add_describe(CLI::App* app, Action* action) {
   const auto arguments = std::make_shared<PluginsArguments>();
   CLI::App* command = app->add_subcommand("describe", "A plugin's kind, version, capabilities and properties");
-  command->footer("Example: gravitas describe Sequential");
+  command->footer(
+      "Example: gravitas describe Sequential\n"
+      "         gravitas describe 'python3 my_worker.py'");
   CLI::Option* reference = command->add_flag("--reference", arguments->reference,
                                              "Print the reference page of the scene language instead (Markdown)");
-  command->add_option("PLUGIN", arguments->name, "Name of a plugin or of a type it serves, or path of a library")
+  command
+      ->add_option("PLUGIN", arguments->name,
+                   "Name of a plugin or of a type it serves, path of a library, or a command that starts a worker")
       ->excludes(reference);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([=] {

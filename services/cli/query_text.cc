@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "plugin_sdk/counted.h"
 #include "services/recorder/durable_file.h"
 #include "services/run/session.h"
 
@@ -70,7 +71,8 @@ query::v1::Batch parse_query(const QueryText& text) {
   for (const std::string& one : text.rays) {
     const std::vector<double> numbers = numbers_of("--ray", one);
     if (numbers.size() != 6 && numbers.size() != 7)
-      throw BadInput(fmt::format("--ray {}: {} numbers; allowed: X,Y,Z,DX,DY,DZ[,LENGTH]", one, numbers.size()));
+      throw BadInput(
+          fmt::format("--ray {}: {}; allowed: X,Y,Z,DX,DY,DZ[,LENGTH]", one, counted(numbers.size(), "number")));
     query::v1::Ray* ray = batch.add_rays();
     for (std::size_t i = 0; i < 6; ++i) (i < 3 ? ray->mutable_origin() : ray->mutable_direction())->Add(numbers[i]);
     if (numbers.size() == 7) ray->set_length(numbers[6]);

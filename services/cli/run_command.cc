@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 
+#include "plugin_sdk/counted.h"
 #include "services/cli/commands.h"
 #include "services/cli/option_checks.h"
 #include "services/cli/scene_options.h"
@@ -81,8 +82,7 @@ int run_scene(RunLine* line) {
 
 std::string process_of(const report::v1::PlannedSlot& slot) {
   if (slot.process() == 0) return "this one";
-  const std::string standby =
-      slot.standby() > 0 ? fmt::format(" and {} standby{}", slot.standby(), slot.standby() == 1 ? "" : "s") : "";
+  const std::string standby = slot.standby() > 0 ? " and " + counted(slot.standby(), "standby", "standbys") : "";
   return fmt::format("worker {}{}", slot.process(), standby);
 }
 

@@ -8,6 +8,8 @@
 #include <csignal>
 #include <iostream>
 #include <memory>
+#include <optional>
+#include <system_error>
 
 #include "plugin_sdk/channel/address.h"
 #include "services/cli/commands.h"
@@ -82,7 +84,13 @@ int serve(ServeLine* line) {
     loop.run();
     run.interrupt();
   }
-  const std::optional<control::ServedRun::Saved> saved = run.save_checkpoint();
+  std::optional<control::ServedRun::Saved> saved;
+  try {
+    saved = run.save_checkpoint();
+  } catch (const std::system_error&) {
+    // what a fault says of it
+    if (run.status().state() != "faulted") throw;
+  }
   const control_api::v1::Status status = run.status();
   std::cout << control::status_page(status);
   if (saved && !saved->go_on_by.empty())

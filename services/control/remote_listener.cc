@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "plugin_sdk/counted.h"
 #include "services/control/served_run.h"
 
 namespace gravitas::control {
@@ -24,14 +25,16 @@ void RemoteListener::on_pairs(std::span<PairQuestion> pairs) {
   if (state_ == State::kEnded) throw std::runtime_error("its client has gone");
   state_ = State::kIdle;
   if (static_cast<std::size_t>(decisions_.pairs_size()) != pairs.size())
-    throw std::runtime_error(fmt::format("it decided about {} of {} pairs", decisions_.pairs_size(), pairs.size()));
+    throw std::runtime_error(
+        fmt::format("it decided about {} of {}", decisions_.pairs_size(), counted(pairs.size(), "pair")));
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const api::PairDecision& decision = decisions_.pairs(static_cast<int>(i));
     pairs[i].may_collide = !decision.forbidden();
     if (decision.material_size() == 0) continue;
     if (decision.material_size() != kMaterialColumns)
-      throw std::runtime_error(fmt::format("its material of '{}' and '{}' has {} numbers; allowed: none or {}",
-                                           pairs[i].id_a, pairs[i].id_b, decision.material_size(), +kMaterialColumns));
+      throw std::runtime_error(fmt::format("its material of '{}' and '{}' has {}; allowed: none or {}", pairs[i].id_a,
+                                           pairs[i].id_b, counted(decision.material_size(), "number"),
+                                           +kMaterialColumns));
     std::ranges::copy(decision.material(), pairs[i].material.begin());
   }
 }

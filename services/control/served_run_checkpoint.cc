@@ -119,7 +119,7 @@ void ServedRun::keep_faulted_state() {
     resume_command_ = command_to_resume();
   } catch (const std::exception& problem) {
     if (!recorder_->keeps() || !recorder_->saved_step()) {
-      fault_ += fmt::format("; no checkpoint: {}", problem.what());
+      fault_ += fmt::format("; no checkpoint could be written: {}", problem.what());
       return;
     }
     // the one before

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/near_miss.h"
 #include "services/control/served_run.h"
 #include "services/edit/edited_scene.h"
@@ -94,7 +95,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     figures_->begin_again(environment_.get());
     with_subscriptions([](Subscription* one) { one->source().begin_again(); });
     Event event{EventKind::kEdit, environment_->step_count(), environment_->time()};
-    event.text = fmt::format("{} changes before step {}", edit.changes_size(), edit.step());
+    event.text = fmt::format("{} before step {}", counted(edit.changes_size(), "change"), edit.step());
     tell(event);
     for (const std::uint32_t body : woken)
       tell({EventKind::kWake, environment_->step_count(), environment_->time(), body});

@@ -7,6 +7,7 @@
 #include <set>
 #include <system_error>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/property_value.h"
 #include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
@@ -23,7 +24,7 @@ constexpr std::size_t kMostShown = 32, kMostWarnings = 1000;
 constexpr std::chrono::seconds kCollection{5};
 
 std::string value_text(const Property& property, std::span<const double> numbers) {
-  if (property.kind == PropertyKind::kTable) return fmt::format("{} rows", numbers[0]);
+  if (property.kind == PropertyKind::kTable) return counted(static_cast<std::uint64_t>(numbers[0]), "row");
   if (std::isnan(numbers[0])) return "absent";
   if (property.kind == PropertyKind::kFlag) return numbers[0] != 0.0 ? "true" : "false";
   if (property.kind == PropertyKind::kChoice) return property.choices.at(static_cast<std::size_t>(numbers[0]));

@@ -13,6 +13,8 @@
 #include <thread>
 #include <utility>
 
+#include "plugin_sdk/counted.h"
+
 namespace gravitas {
 namespace {
 
@@ -165,7 +167,7 @@ void PairDecisions::ask(std::vector<PairQuestion> questions) {
       problem = desk->problem;
       questions = std::move(desk->pairs);
     } else {
-      problem = fmt::format("no answer within {:g} s about {} pairs", deadline_, desk->pairs.size());
+      problem = fmt::format("no answer within {:g} s about {}", deadline_, counted(desk->pairs.size(), "pair"));
     }
   }
   if (problem.empty()) problem = find_impossible(questions);

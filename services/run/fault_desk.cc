@@ -53,6 +53,13 @@ std::string not_injected(std::string_view kind, std::uint32_t step) {
   return fmt::format("fault {} of step {} was not injected", kind, step);
 }
 
+bool is_slowness(std::string_view order) {
+  std::string problem;
+  const std::optional<host::FaultOrder> read = host::parse_fault_order(std::string(order), &problem);
+  return read && (read->fault() == InjectedFault::kSlow || read->fault() == InjectedFault::kJitter ||
+                  read->fault() == InjectedFault::kDelay);
+}
+
 bool can_come_from_outside(const std::string& order) {
   std::string problem;
   const std::optional<host::FaultOrder> read = host::parse_fault_order(order, &problem);
@@ -74,10 +81,13 @@ class DeskHost final : public capsule::ForwardingHost {
                           kernel::DerivativeSource* derivatives) override {
     if (call.fault.empty()) return host_->call(call, arena, derivatives);
     if (commits_) {
+      const auto begin = Clock::now();
       kernel::CallResult result = host_->call(call, arena, derivatives);
       const std::string_view mark = host::kNotInjected;
       if (result.status == GRAVITAS_OK && result.text.starts_with(mark))
         complain(call.fault, result.text.substr(mark.size()));
+      else if (result.status == GRAVITAS_OK && is_slowness(call.fault))
+        tell_slow(call.fault, std::chrono::duration<double, std::milli>(Clock::now() - begin).count());
       return result;
     }
     kernel::StageCall plain = call;
@@ -93,9 +103,18 @@ class DeskHost final : public capsule::ForwardingHost {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  std::uint32_t step() const { return world_ ? world_->step_count() + 1 : 0; }
+
   void complain(std::string_view order, const std::string& why) {
-    complaints_.push_back(fmt::format(
-        "{}: {}", not_injected(order.substr(0, order.find(',')), world_ ? world_->step_count() + 1 : 0), why));
+    complaints_.push_back(fmt::format("{}: {}", not_injected(order.substr(0, order.find(',')), step()), why));
+  }
+
+  // However little it is: of what nobody ordered, 20 ms may be a busy machine's doing (plugin_sdk/slow_calls.h).
+  void tell_slow(std::string_view order, double milliseconds) {
+    complaints_.push_back(
+        fmt::format("it was slow by fault {} of step {}: the call took {:.3g} ms", order, step(), milliseconds));
   }
 
   void come_from_outside(const std::string& order) {
@@ -114,9 +133,8 @@ class DeskHost final : public capsule::ForwardingHost {
 
   template <class Condition>
   static void wait_while(Condition&& condition) {
-    const auto until = std::chrono::steady_clock::now() + kEndPatience;
-    while (condition() && std::chrono::steady_clock::now() < until)
-      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    const auto until = Clock::now() + kEndPatience;
+    while (condition() && Clock::now() < until) std::this_thread::sleep_for(std::chrono::microseconds(200));
   }
 
   const bool commits_, is_elsewhere_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/property_value.h"
 #include "plugin_sdk/solver.h"
@@ -236,9 +237,7 @@ void Figures::write(report::v1::Report* report) const {
     report->add_warnings(fmt::format(
         "at the start bodies \"{}\" and \"{}\" overlap by {:.3g} m{}: contacts push them apart in the first steps",
         overlap_.one, overlap_.two, overlap_.depth,
-        overlap_.others == 0
-            ? ""
-            : fmt::format(", and {} more {}", overlap_.others, overlap_.others == 1 ? "pair" : "pairs")));
+        overlap_.others == 0 ? "" : ", and " + counted(overlap_.others, "more pair")));
   if (opening_step_)
     report->add_warnings(fmt::format(
         "joints came open by up to {:.3g} m, by more than {:.0f} % of what they hold together ({:.3g} m) from step {} "

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "kernel/slot_host.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/host/fault_kinds.h"
 #include "services/run/kernel_names.h"
 #include "services/run/omissions.h"
@@ -109,7 +112,7 @@ std::string pause_text(const kernel::EnvironmentDescription& description, const 
 }
 
 std::string edit_line(const report::v1::EditRecord& edit) {
-  return fmt::format("edit before step {}: {} change{}", edit.step(), edit.changes(), edit.changes() == 1 ? "" : "s");
+  return fmt::format("edit before step {}: {}", edit.step(), counted(edit.changes(), "change"));
 }
 
 void write_disagreement(const Disagreement& from, report::v1::Disagreement* to) {
@@ -150,9 +153,9 @@ std::string disagreement_text(const report::v1::Disagreement& disagreement) {
     apart = fmt::format("{:.3g}{} apart at most, {:.3g} of the largest ({})", one.largest(),
                         one.unit() == "1" ? "" : " " + one.unit(), one.relative(), row);
   else if (one.rows() > 0)
-    apart = fmt::format("{} rows differ ({})", one.rows(), row);
+    apart = fmt::format("{} ({})", counted(one.rows(), "row differs", "rows differ"), row);
   if (one.other_counts() > 0)
-    apart += fmt::format("{}{} times another number of rows", apart.empty() ? "" : "; ", one.other_counts());
+    apart += fmt::format("{}{} another number of rows", apart.empty() ? "" : "; ", counted(one.other_counts(), "time"));
   return one.quantity() + ": " + apart;
 }
 
@@ -203,6 +206,16 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
     out->set_why(one.why);
   }
   return message;
+}
+
+void fold_warnings(report::v1::Report* report) {
+  std::map<std::string, int> times;
+  for (const std::string& warning : report->warnings()) ++times[warning];
+  report::v1::Report folded;
+  for (const std::string& warning : report->warnings())
+    if (const int all = std::exchange(times[warning], 0); all > 0)
+      folded.add_warnings(all > 1 ? fmt::format("{} ({} times)", warning, all) : warning);
+  report->mutable_warnings()->Swap(folded.mutable_warnings());
 }
 
 void settle_swaps(report::v1::Report* report) {

@@ -41,6 +41,9 @@ std::string fallback_of(const std::string& recovered_by);
 std::string pause_text(const kernel::EnvironmentDescription& description, const kernel::FaultRecord& record,
                        bool is_poisoned);
 
+// Warnings that are alike become the first of them, with their count: "… (275 times)".
+void fold_warnings(report::v1::Report* report);
+
 // The environment whose swaps have been written is replaced by another: probation has passed.
 void settle_swaps(report::v1::Report* report);
 

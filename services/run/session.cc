@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
@@ -166,8 +167,8 @@ class Run final : private kernel::CommitListener {
       if (is_unrepeatable_) return;
       try {
         if (!keeps && result_.outcome == RunOutcome::kPaused) keep_paused_state();
-      } catch (const BadInput& problem) {
-        result_.fault += fmt::format("; no checkpoint: {}", problem.what());
+      } catch (const std::runtime_error& problem) {
+        result_.fault += fmt::format("; no checkpoint could be written: {}", problem.what());
       }
       // also over one of this step: in the step that pauses a run others may have taken over
       if (keeps) recorder_->save_last(*environment_);
@@ -364,7 +365,7 @@ class Run final : private kernel::CommitListener {
     figures_->begin_again(environment_.get());
     give_orders();
     tell({EventKind::kEdit, environment_->step_count(), environment_->time()},
-         fmt::format("{} changes before step {}", edit->changes_size(), edit->step()));
+         fmt::format("{} before step {}", counted(edit->changes_size(), "change"), edit->step()));
     for (const std::uint32_t body : woken)
       tell({EventKind::kWake, environment_->step_count(), environment_->time(), body}, "");
     // last, as the edit is made: a disk may be full
@@ -384,8 +385,8 @@ class Run final : private kernel::CommitListener {
   void warn_of_orders_beyond_the_end() {
     const auto warn = [&](const char* option, std::uint32_t step) {
       if (step > description_.steps)
-        warnings_.push_back(
-            fmt::format("{} at step {} never comes: the run has {} steps", option, step, description_.steps));
+        warnings_.push_back(fmt::format("{} at step {} never comes: the run has {}", option, step,
+                                        counted(description_.steps, "step")));
     };
     for (const kernel::SwapOrder& order : swaps_) warn("--swap", order.step);
     for (const kernel::FaultInjection& fault : faults_) warn("--fault", fault.step);
@@ -474,8 +475,9 @@ class Run final : private kernel::CommitListener {
     result_.fault = "paused at " + pause_text(description_, record, poisoned_step_ >= record.step);
   }
 
+  // A run that has paused stays that: what fails after it is said besides.
   void fail(const std::string& why) {
-    result_.outcome = RunOutcome::kFailed;
+    if (result_.outcome != RunOutcome::kPaused) result_.outcome = RunOutcome::kFailed;
     if (result_.fault.find(why) == std::string::npos) result_.fault += (result_.fault.empty() ? "" : "; ") + why;
   }
 
@@ -574,6 +576,7 @@ void Run::write_report() {
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
   name_orders(faults_, description_, report.steps(), true, &report);
   if (!edits_.made().empty()) report.add_warnings("times of stages and steps are those since the last edit");
+  fold_warnings(&report);
   write_stages(*environment_, &report);
   figures_->write(&report);
   if (!reactions_) return;

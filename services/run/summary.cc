@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "plugin_sdk/counted.h"
 #include "services/run/report.h"
 
 namespace gravitas {
@@ -29,7 +30,7 @@ std::string story(const report::v1::Report& report, const std::vector<EventLog::
   tell_drives(report.drives(), "turns", "rad/s");
   tell_drives(report.sliding_drives(), "slides", "m/s");
   if (report.events().break_() > 0)
-    text += fmt::format("{}{} joints broke", text.empty() ? "" : "; ", report.events().break_());
+    text += fmt::format("{}{} broke", text.empty() ? "" : "; ", counted(report.events().break_(), "joint"));
   return text;
 }
 
@@ -41,7 +42,7 @@ std::string hosts(const report::v1::Plan& plan) {
     processes = std::max(processes, slot.process());
   }
   return processes == 0 ? fmt::format("in this process: {}", names)
-                        : fmt::format("{} worker processes: {}", processes, names);
+                        : fmt::format("{}: {}", counted(processes, "worker process", "worker processes"), names);
 }
 
 // Faults that were survived, swaps and edits; of faults and edits a line each for the first ones.
@@ -79,7 +80,7 @@ std::string exchanges(const report::v1::Report& report) {
                           fault.plugin(), fault.kind(), words(fault), fault.recovered_by(), 1e-3 * fault.recovery_us());
   }
   if (survived > static_cast<int>(kMostNamed))
-    text += fmt::format("  survived: {} more faults\n", survived - static_cast<int>(kMostNamed));
+    text += fmt::format("  survived: {}\n", counted(survived - static_cast<int>(kMostNamed), "more fault"));
   for (const report::v1::FaultRecord& fault : report.faults())
     if (const std::string names = fallback_of(fault.recovered_by()); !names.empty())
       text += fmt::format("  another plugin from step {} on: {}, {} instead of {}\n", fault.step(), fault.slot(), names,
@@ -89,7 +90,7 @@ std::string exchanges(const report::v1::Report& report) {
                         swap.outcome(), swap.reason().empty() ? "" : ": " + swap.reason());
   const int edits = std::min(report.edits_size(), static_cast<int>(kMostNamed));
   for (int i = 0; i < edits; ++i) text += fmt::format("  {}\n", edit_line(report.edits(i)));
-  if (report.edits_size() > edits) text += fmt::format("  {} more edits\n", report.edits_size() - edits);
+  if (report.edits_size() > edits) text += fmt::format("  {}\n", counted(report.edits_size() - edits, "more edit"));
   for (const report::v1::SwapRecord& one : report.comparisons())
     text += fmt::format("  compared{}: {} {} with {}: {}{}\n",
                         one.step() > 1 ? fmt::format(" from step {} on", one.step()) : "", one.slot(), one.from(),
@@ -101,10 +102,10 @@ std::string exchanges(const report::v1::Report& report) {
 }  // namespace
 
 std::string summarize(const report::v1::Report& report, const std::vector<EventLog::Meeting>& meetings) {
-  std::string text =
-      fmt::format("{}: {:.6g} s in {} steps, {} bodies, {:.3f} s of wall time (median {:.1f} us a step)\n",
-                  report.scene(), report.simulated_seconds(), report.steps(), report.bodies(), report.wall_seconds(),
-                  report.microseconds_per_step().median());
+  std::string text = fmt::format("{}: {:.6g} s in {}, {}, {:.3f} s of wall time (median {:.1f} us a step)\n",
+                                 report.scene(), report.simulated_seconds(), counted(report.steps(), "step"),
+                                 counted(report.bodies(), "body", "bodies"), report.wall_seconds(),
+                                 report.microseconds_per_step().median());
   const std::string happened = story(report, meetings);
   if (!happened.empty()) text += "  " + happened + "\n";
   const auto energy = [](bool is_known, double number) {

@@ -96,7 +96,28 @@ class Override {
     if (word == "Geometry") return with_id(scene_->mutable_geometries()->mutable_geometry(), root, rest);
     if (word == "Material") return with_id(scene_->mutable_materials()->mutable_material(), root, rest);
     if (word == "Force") return with_id(scene_->mutable_forces()->mutable_force(), root, rest);
-    throw Refused{root.offset, "the path begins with \"" + std::string(word) + "\"; " + allowed_names(word, kRoots)};
+    const std::string meant = with_its_beginning(std::string(word));
+    throw Refused{root.offset,
+                  "the path begins with \"" + std::string(word) + "\"; " +
+                      (meant.empty() ? allowed_names(word, kRoots)
+                                     : "did you mean \"" + meant + "\"? Allowed: " + quoted_names(kRoots))};
+  }
+
+  // What a path lacks that begins with a property of the simulator or an id: "Simulator.Duration", "Body.Ball01"; empty: it
+  // begins with neither.
+  std::string with_its_beginning(const std::string& word) const {
+    const auto has_it = [&](const auto& blocks) {
+      return std::ranges::any_of(blocks, [&](const auto& block) { return block.id() == word; });
+    };
+    if (scene_->environment_size() > 0 && has_it(scene_->environment(0).space().bodies().body())) return "Body." + word;
+    if (scene_->environment_size() > 0 && has_it(scene_->environment(0).constraints().constraint()))
+      return "Constraint." + word;
+    if (has_it(scene_->geometries().geometry())) return "Geometry." + word;
+    if (has_it(scene_->materials().material())) return "Material." + word;
+    if (has_it(scene_->forces().force())) return "Force." + word;
+    if (!nearest_name(word, kRoots).empty()) return {};
+    const std::string property = nearest_name(word, grammar_of(*v1::SimulatorProperties::descriptor()).names);
+    return property.empty() ? "" : "Simulator." + property;
   }
 
   v1::Environment* environment(const Part& root) {

@@ -263,6 +263,14 @@ class SceneReading {
   std::uint64_t present_ = 0;
 };
 
+constexpr const char* kQuoteOverrides =
+    "; a --set with braces is quoted, or the shell splits it: --set 'Body.Ball.Position={0,1,0}'";
+
+// What is left of an override whose braces, or blanks between them, the shell has split: `Body.Ball.Position=1`, `0}`.
+bool is_split_override(std::string_view path) {
+  return path.find('=') != std::string_view::npos || path.ends_with(',') || path.ends_with('}');
+}
+
 }  // namespace
 
 bool read_texts(std::span<const SceneText> texts, SceneDocument* document, Problems* problems) {
@@ -293,7 +301,8 @@ bool read_files(std::span<const std::string> paths, SceneDocument* document, Pro
     if (read_input_file(path, &text, &why)) {
       reading.read(text, file);
     } else {
-      reading.diagnostics().error({file, 1, 1}, "cannot be read: " + why + "; a scene is a readable text file");
+      reading.diagnostics().error({file, 1, 1}, "cannot be read: " + why + "; a scene is a readable text file" +
+                                                    (is_split_override(path) ? kQuoteOverrides : ""));
     }
   }
   return reading.finish();

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/near_miss.h"
 #include "services/run/session.h"
 #include "services/study/analysis.h"
@@ -127,8 +128,8 @@ std::vector<Demand> read_demands(const std::string& path, std::vector<std::strin
     for (std::size_t i = 0; i < known->numbers; ++i) rest >> numbers[i];
     std::string more;
     if (!rest || rest >> more || !(numbers[0] >= 0.0) || !(numbers[1] >= 0.0))
-      refuse(fmt::format("\"{}\"; allowed: {} PROBLEM METHOD and {} number{} >= 0", line, word, known->numbers,
-                         known->numbers == 1 ? "" : "s"));
+      refuse(
+          fmt::format("\"{}\"; allowed: {} PROBLEM METHOD and {} >= 0", line, word, counted(known->numbers, "number")));
     (known->numbers == 1 ? demand.high : demand.low) = numbers[0];
     if (known->numbers == 2) demand.high = numbers[1];
     if (demand.what == Demand::What::kOrder && demand.low > demand.high)
@@ -159,7 +160,8 @@ void apply_gate(const std::vector<Demand>& demands, v1::Study* study) {
     if (ladder->is_interrupted())
       study->add_not_shown(which + miss.why + "; it was interrupted");
     else if (miss.finer_rungs_may_do && ran_out_of_time(*ladder))
-      study->add_not_shown(which + miss.why + "; finer rungs were not run, since one took more CPU than it may");
+      (demand.is_built_in ? study->add_undecided() : study->add_not_shown())
+          ->append(which + miss.why + "; finer rungs were not run, since one took more CPU than it may");
     else
       study->add_failures(which + miss.why);
   }

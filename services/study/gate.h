@@ -37,8 +37,9 @@ std::vector<Demand> built_in_demands();
 std::vector<Demand> read_demands(const std::string& path, std::vector<std::string> problems,
                                  std::vector<std::string> methods);
 
-// Fills failures, what is not shown, and demands of the study. Not shown is what a file demands of a ladder that was not
-// run, and what a ladder misses that was interrupted, or came to the end of its CPU.
+// Fills failures, what is not shown or undecided, and demands of the study. Not shown is what a file demands of a ladder that
+// was not run or came to the end of its CPU, and what one misses that was interrupted; built-in demands of one that came to the
+// end of its CPU are undecided.
 void apply_gate(const std::vector<Demand>& demands, v1::Study* study);
 
 // Nothing failed, nothing is not shown, and nobody interrupted it.

@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "plugin_sdk/counted.h"
 #include "services/recorder/csv.h"
 #include "services/study/analysis.h"
 #include "services/study/gate.h"
@@ -149,14 +150,18 @@ std::string hosting_text(const v1::Study& study) {
 }
 
 std::string gate_text(const v1::Study& study) {
-  if (is_passed(study))
-    return study.demands() == 0 ? "the gate demands nothing of what was run\n"
-                                : fmt::format("the gate is passed: {} demands\n", study.demands());
-  // what has no reference fails, too
-  std::string text = fmt::format("the gate {}, of {} demands:\n", study.failures().empty() ? "is not passed" : "failed",
-                                 study.demands());
+  std::string text;
+  if (!is_passed(study))  // what has no reference fails, too
+    text = fmt::format("the gate {}, of {}:\n", study.failures().empty() ? "is not passed" : "failed",
+                       counted(study.demands(), "demand"));
+  else if (study.demands() == 0)
+    text = "the gate demands nothing of what was run\n";
+  else
+    text = "the gate is passed: " + counted(study.demands(), "demand") +
+           (study.undecided().empty() ? "" : fmt::format(", {} of them undecided", study.undecided_size())) + "\n";
   for (const std::string& failure : study.failures()) text += "  " + failure + "\n";
   for (const std::string& missing : study.not_shown()) text += "  not shown: " + missing + "\n";
+  for (const std::string& open : study.undecided()) text += "  undecided: " + open + "\n";
   if (study.is_interrupted()) text += "  not shown: what comes after the interruption\n";
   return text;
 }

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "plugin_sdk/channel/digest.h"
+#include "plugin_sdk/counted.h"
 #include "plugin_sdk/geometry/scene_shape.h"
 #include "plugin_sdk/near_miss.h"
 #include "plugin_sdk/property_value.h"
@@ -27,7 +28,7 @@ constexpr double kFarthest = 1e100;  // m: detectors take no more (plugin_sdk/co
 Vector3 QuestionReader::vector(const google::protobuf::RepeatedField<double>& numbers, const std::string& place,
                                bool is_needed) const {
   if (numbers.empty() && !is_needed) return Vector3::Zero();
-  if (numbers.size() != 3) refuse(place, fmt::format("{} numbers; allowed: 3", numbers.size()));
+  if (numbers.size() != 3) refuse(place, counted(numbers.size(), "number") + "; allowed: 3");
   const Vector3 v(numbers[0], numbers[1], numbers[2]);
   if (!(v.cwiseAbs().maxCoeff() <= kFarthest))
     refuse(place, fmt::format("a number that is not finite, or beyond {:g}", kFarthest));
@@ -117,7 +118,7 @@ Probe QuestionReader::probe(const query::v1::Shape& shape, const std::string& pl
   if (!shape.position().empty()) probe.pose.position = vector(shape.position(), place + ".position");
   if (!shape.orientation().empty()) {
     const auto& q = shape.orientation();
-    if (q.size() != 4) refuse(place + ".orientation", fmt::format("{} numbers; allowed: 4 (w, x, y, z)", q.size()));
+    if (q.size() != 4) refuse(place + ".orientation", counted(q.size(), "number") + "; allowed: 4 (w, x, y, z)");
     probe.pose.orientation = Quaternion(q[0], q[1], q[2], q[3]);
     // not so for what is no number
     if (!(std::fabs(probe.pose.orientation.norm() - 1.0) <= 1e-3))

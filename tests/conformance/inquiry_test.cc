@@ -136,7 +136,7 @@ TEST(Inquiry, NamesTheNumberThatDiffers) {
   };
   EXPECT_EQ(equal(other), "");
   EXPECT_EQ(equal(third), "asked: wrench number 2 is 4, should be 3 exactly");
-  EXPECT_EQ(equal(shorter), "asked: wrench has 1 numbers, should have 3");
+  EXPECT_EQ(equal(shorter), "asked: wrench has 1 number, should have 3");
 }
 
 TEST(Inquiry, NamesTheRowThatIsNotUnit) {

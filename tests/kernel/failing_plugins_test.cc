@@ -117,7 +117,7 @@ const Expected kWrong[] = {
     {"integrator_nan", FaultKind::kBadNumbers, "numbers", "position of row 1 is not finite"},
     {"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
     {"integrator_moves_ground", FaultKind::kBadNumbers, "numbers", "immovable body 'body0'"},
-    {"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 rows"},
+    {"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 row"},
     {"integrator_long", FaultKind::kBadStructure, "structure", "position has 200000 rows"},
 };
 

@@ -111,7 +111,7 @@ TEST(CheckRows, WantsSingleValues) {
   }
   reply[Reply::kErrorEstimate] = 1;
   reply[Reply::kPosition] = 3;
-  EXPECT_EQ(check_rows(integrate, request, reply), "column position has 1 rows, expected 2 (one per body)");
+  EXPECT_EQ(check_rows(integrate, request, reply), "column position has 1 row, expected 2 (one per body)");
 }
 
 TEST(RowCheck, FindsEachTimeWhatCheckRowsFinds) {

@@ -363,5 +363,29 @@ TEST(PythonKit, NonsenseIsNoRefusal) {
   EXPECT_THAT(mumbling.words, HasSubstr("it answers with something else than Welcome or Refusal"));
 }
 
+// It was no declaration any more, and no word of why.
+TEST(PythonDeclaration, IsNotHiddenByWhatThePluginPrints) {
+  const harness::ScratchFolder folder;
+  const std::string worker =
+      folder.write("talking.py", "import os\nimport sys\nsys.path.append('" + kFolder +
+                                     "')\nfrom force_drag import Drag\nfrom gravitas_worker import main\n"
+                                     "print('has loaded', flush=True)\nos.system('echo has started')\nmain(Drag)\n");
+  const Ended check = ended(kPython + " " + kGravitas + " check " +
+                            in_shell("/usr/bin/python3 -B " + in_shell(worker)) + " --case handshake/magic");
+  EXPECT_EQ(check.code, 0) << check.words;
+}
+
+TEST(PythonDeclaration, SaysWhichModulesAreMissingAndWhereTheyAre) {
+  const std::string check = " " + kGravitas + " check ", script = in_shell(kFolder + "force_drag.py");
+  const Ended none = ended(kPython + check + in_shell("/usr/bin/python3 -S " + script));
+  EXPECT_EQ(none.code, 2) << none.words;
+  EXPECT_THAT(none.words, HasSubstr("No module named 'numpy'; it needs Debian's packages python3-numpy, "));
+  const Ended lost = ended("PYTHONPATH=" + check + in_shell("/usr/bin/python3 " + script));
+  EXPECT_EQ(lost.code, 2) << lost.words;
+  EXPECT_THAT(lost.words, HasSubstr("No module named 'gravitas_worker'; PYTHONPATH must name the folder of the Python "
+                                    "SDK: " +
+                                    in_shell(in_build("/lib/python"))));
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -41,6 +41,13 @@ LOCAL_ADDRESS = re.compile(r"unix:.+|(127(\.\d{1,3}){3}|\[::1\]|localhost):\d{1,
 
 _Reason = control_pb2.Refusal
 
+# With --describe standard output is the declaration's alone: what a plugin prints, from here on or before and not yet
+# written, goes to standard error.
+_DESCRIBES = sys.argv[1:] == ["--describe"]
+if _DESCRIBES:
+    _declaration_file = os.dup(1)
+    os.dup2(2, 1)
+
 
 class Worker(grpc.GenericRpcHandler):
     """Serves one kernel after the other."""
@@ -181,7 +188,8 @@ def _worker_message(**kind):
 def _describe(plugin):
     catalog = description_pb2.Catalog()
     catalog.entries.add(library=encodable(sys.argv[0]), description=description_of(plugin, BUILD_ID))
-    sys.stdout.buffer.write(catalog.SerializeToString())
+    with os.fdopen(_declaration_file, "wb") as file:
+        file.write(catalog.SerializeToString())
 
 
 def _listen(plugin, address):
@@ -222,7 +230,7 @@ def _listen(plugin, address):
 def main(plugin):
     """The program of a worker with one plugin."""
     arguments = sys.argv[1:]
-    if arguments == ["--describe"]:
+    if _DESCRIBES:
         _describe(plugin)
     elif len(arguments) == 2 and arguments[0] == "--listen":
         _listen(plugin, arguments[1])

@@ -288,7 +288,7 @@ TEST(Capsule, APoisonedRequestIsKeptAndFailsAgainAlone) {
   const KeptRequest kept = kept_request("integrator", "integrator_poisoned", "Integrator=Poisoned", folder);
   const ProgramResult again = run_program({"replay", kept.file}, folder);
   EXPECT_EQ(again.exit_code, 4) << again.err;
-  EXPECT_THAT(again.out, HasSubstr("1 calls: 0 same, 0 different, 1 failed again"));
+  EXPECT_THAT(again.out, HasSubstr("1 call: 0 same, 0 different, 1 failed again"));
   const ProgramResult sound = run_program({"replay", kept.file, "--plugin", "SemiImplicitEuler"}, folder);
   EXPECT_EQ(sound.exit_code, 0) << sound.err;
   EXPECT_THAT(sound.out, HasSubstr("1 failed then and are answered now"));
@@ -324,7 +324,7 @@ TEST_P(RefusedAnswer, FailsAgainAlone) {
   EXPECT_THAT(kept.words, HasSubstr(one.words));
   const ProgramResult again = run_program({"replay", kept.file}, folder);
   EXPECT_EQ(again.exit_code, 4) << again.out << again.err;
-  EXPECT_THAT(again.out, HasSubstr("1 calls: 0 same, 0 different, 1 failed again"));
+  EXPECT_THAT(again.out, HasSubstr("1 call: 0 same, 0 different, 1 failed again"));
   EXPECT_THAT(again.out, HasSubstr(one.words));
   const ProgramResult sound = run_program({"replay", kept.file, "--plugin", one.sound}, folder);
   EXPECT_EQ(sound.exit_code, 0) << sound.out << sound.err;

@@ -195,8 +195,10 @@ TEST_F(CatalogTest, SaysWhenNobodyCanBeAsked) {
   EXPECT_THAT(problem((folder_ / "none").string()), HasSubstr("could not be started: No such file"));
   EXPECT_THAT(problem(program("echo no >&2; exit 3")), HasSubstr("--describe ended with status 3: no"));
   EXPECT_THAT(problem(program("kill -9 $$")), HasSubstr("--describe was ended by signal 9"));
-  EXPECT_THAT(problem(program("echo nonsense")), HasSubstr("--describe wrote no catalogue of 1 plugins"));
-  EXPECT_THAT(problem(program("true")), HasSubstr("--describe wrote no catalogue of 1 plugins"));
+  EXPECT_THAT(problem(program("echo nonsense; echo more")),
+              HasSubstr("--describe wrote no catalogue of 1 plugin: its standard output, which is the catalogue's "
+                        "alone, begins with \"nonsense\""));
+  EXPECT_THAT(problem(program("true")), HasSubstr("--describe wrote no catalogue of 1 plugin: it wrote nothing"));
   const Catalog nowhere = Catalog::installed("/bin/true", (folder_ / "none").string());
   EXPECT_THAT(nowhere.broken().at(0).problem, HasSubstr("the folder cannot be read"));
 }

@@ -129,7 +129,7 @@ const BadScene kBadScenes[] = {
      with_joint("Slider", "BindPoint = {0, 2, 0} Axis = {0, 1, 0}\nMotion = {{1, 0},\n{0.5, 1}}"), "8:1",
      "error: Slider \"J2\": Motion has the time 0.5 after 1; allowed: times that ascend"},
     {"course_of_times", with_joint("Slider", "BindPoint = {0, 2, 0} Axis = {0, 1, 0}\nMotion = {{1, 0}, {2}}"), "7:19",
-     "error: Slider \"J2\": a row of Motion has 1 numbers; allowed: a list of rows of 2 numbers"},
+     "error: Slider \"J2\": a row of Motion has 1 number; allowed: a list of rows of 2 numbers"},
     {"course_that_is_not_finite",
      with_joint("Slider", "BindPoint = {0, 2, 0} Axis = {0, 1, 0}\nMotion = {{1, 0}, {2, 1e999}}"), "7:23", "1e999"},
     {"crossed_distances",
@@ -342,7 +342,7 @@ TEST(BadInput, CommandsThatStartNoWorker) {
   const ScratchFolder folder;
   for (const auto& [command, expected] :
        std::vector<std::pair<std::string, std::string>>{{"false", "false --describe ended with status 1"},
-                                                        {"echo", "wrote no catalogue of 1 plugins"},
+                                                        {"echo", "wrote no catalogue of 1 plugin: its standard output"},
                                                         {"no-such-program", "No such file or directory"}}) {
     const std::string plugins =
         folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"solver\" Command = \"" + command + "\" } }");
@@ -356,7 +356,9 @@ TEST(BadInput, CommandsThatStartNoWorker) {
 TEST(BadInput, OptionsOfTheCommandLine) {
   const ScratchFolder folder;
   for (const auto& [option, expected] : std::vector<std::pair<std::vector<std::string>, std::string>>{
-           {{"--frobnicate"}, "--frobnicate"},
+           {{"--frobnicate"}, "there is no option \"--frobnicate\"; --help names those that there are\n"},
+           {{"--step=5"}, "there is no option \"--step\"; did you mean \"--steps\"? --help names"},
+           {{"-durations", "5"}, "there is no option \"-durations\"; did you mean \"--duration\"? --help names"},
            {{"--hosting", "cloud"}, "allowed: direct, shm, grpc"},
            {{"--hosting", "grpc:127.0.0.1:7000"}, "SLOT=grpc:ADDRESS"},
            {{"--hosting", "solver=grpc:192.0.2.1:7000"}, "no address of this machine"},
@@ -445,6 +447,24 @@ TEST(BadInput, EmptyValuesOfOptions) {
   }
 }
 
+// It named a file of that name.
+TEST(BadInput, ADashIsNoStandardStream) {
+  const ScratchFolder folder;
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"run", "-"}, {"run", kSample, "--trajectory", "-"}, {"replay", "-"}}) {
+    const ProgramResult result = run_program(arguments, folder);
+    EXPECT_EQ(result.exit_code, 2) << arguments.back();
+    EXPECT_THAT(result.err, HasSubstr(": \"-\"; allowed: a name; /dev/stdin is standard input, /dev/stdout standard"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder.path("-")));
+  // what is named instead is read and written
+  const std::string piped = "cat " + in_shell(kSample) + " | " + in_shell(in_build("/bin/gravitas")) +
+                            " run /dev/stdin --steps 2 --hosting direct --quiet --trajectory /dev/stdout | wc -l > " +
+                            in_shell(folder.path("lines"));
+  EXPECT_EQ(std::system(piped.c_str()), 0);
+  EXPECT_EQ(std::stoi(harness::read_file(folder.path("lines"))), 1 + 3 * 2);
+}
+
 TEST(BadInput, NumbersOfCampaign) {
   const ScratchFolder folder;
   for (const std::string option : {"--seed", "--trial", "--jobs"}) {
@@ -523,6 +543,9 @@ TEST(BadInput, AWordThatIsNoSubcommandIsNamed) {
            {{"ctl", "--socket", "x", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"},
            {{"--bogus"}, "there is no option \"--bogus\""},
            {{"ctl", "--bogus"}, "there is no option \"--bogus\""},
+           {{"ctl", "status", "--jsn"}, "there is no option \"--jsn\"; did you mean \"--json\"?"},
+           {{"describe", "--jsn"}, "there is no option \"--jsn\"; did you mean \"--json\"?"},
+           {{"campaign", "--sed", "1"}, "there is no option \"--sed\"; did you mean \"--seed\"?"},
            {{"ctl", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"}}) {
     const ProgramResult result = run_program(arguments, folder);
     EXPECT_EQ(result.exit_code, 2);

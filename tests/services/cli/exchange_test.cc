@@ -21,6 +21,8 @@ using harness::read_file;
 using harness::read_report;
 using harness::run_program;
 using harness::ScratchFolder;
+using ::testing::Contains;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 struct Outcome {
@@ -67,6 +69,17 @@ TEST(Exchange, AFaultThatCannotBeInjectedIsToldAsThat) {
   // nor does it cost a worker
   EXPECT_EQ(run.report.faults_size(), 0);
   EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+}
+
+// They were hundreds, and hid all others.
+TEST(Exchange, LinesOfAFloodAreOneWarningWithTheirCount) {
+  const Outcome run = run_sample({"--fault", "solver:flood,bytes=1e6@step=5"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+  EXPECT_LT(run.report.warnings_size(), 5);
+  EXPECT_THAT(run.report.warnings(),
+              Contains(ContainsRegex("^worker of slot solver: stdout: \\.{79} \\([0-9]+ times\\)$")));
+  EXPECT_THAT(run.report.warnings(), Contains(HasSubstr(" more bytes dropped")));
 }
 
 TEST(Exchange, ASwapToTheSamePluginOrAnotherHostingChangesNoBit) {
@@ -198,6 +211,19 @@ TEST(Exchange, ASlowWorkerIsFlaggedAndChangesNoBit) {
   EXPECT_EQ(run.report.chain_hash(), quiet_chain());
   EXPECT_EQ(run.report.faults_size(), 0);
   EXPECT_THAT(run.program.err, HasSubstr("worker of slot solver: it was slow"));
+}
+
+// Far less than what is told of calls that nobody ordered to be slow.
+TEST(Exchange, SlownessThatWasOrderedIsFlaggedHoweverLittleItIs) {
+  const Outcome run =
+      run_sample({"--fault", "solver:slow,factor=2@step=50", "--fault", "integrator:jitter,seconds=0.001@step=60"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+  EXPECT_THAT(
+      run.report.warnings(),
+      Contains(HasSubstr("worker of slot solver: it was slow by fault slow,factor=2 of step 50: the call took ")));
+  EXPECT_THAT(run.report.warnings(),
+              Contains(HasSubstr("slot integrator: it was slow by fault jitter,seconds=0.001 of")));
 }
 
 TEST(Exchange, TheReportSaysWhatIsEnforcedOnEveryWorker) {

@@ -98,6 +98,17 @@ TEST(Describe, ShowsPropertiesWithUnitRangeDefaultAndMeaning) {
   EXPECT_EQ(description.types(0).properties(0).unit(), "N");
 }
 
+// As the templates of plugins in Python promise.
+TEST(Describe, TakesACommand) {
+  const ScratchFolder folder;
+  const std::string command =
+      in_shell(in_build("/bin/gravitas-worker")) + " " + in_shell(in_build("/lib/gravitas/hello.so"));
+  const ProgramResult hello = run_program({"describe", command}, folder);
+  EXPECT_EQ(hello.exit_code, 0) << hello.err;
+  EXPECT_THAT(hello.out, HasSubstr("Hello "));
+  EXPECT_THAT(hello.out, HasSubstr("\n  command       " + command + "\n"));
+}
+
 TEST(Describe, WhatIsNotInstalledIsAnErrorThatListsWhatIs) {
   const ScratchFolder folder;
   const ProgramResult result = run_program({"describe", "Nope"}, folder);
@@ -106,7 +117,9 @@ TEST(Describe, WhatIsNotInstalledIsAnErrorThatListsWhatIs) {
   EXPECT_THAT(run_program({"describe", "Sequentail"}, folder).err, HasSubstr("did you mean 'Sequential'? installed: "));
   const ProgramResult file = run_program({"describe", "nope.so"}, folder);
   EXPECT_EQ(file.exit_code, 2);
-  EXPECT_THAT(file.err, HasSubstr("'nope.so': it cannot be read: No such file or directory; allowed: the path of"));
+  EXPECT_THAT(file.err, HasSubstr("'nope.so' is no file that can be read; allowed: a plugin library, a command that"));
+  EXPECT_THAT(run_program({"describe", "echo nope"}, folder).err,
+              HasSubstr("'echo nope': echo nope --describe wrote no catalogue of 1 plugin"));
   EXPECT_EQ(run_program({"describe"}, folder).exit_code, 2);
 }
 

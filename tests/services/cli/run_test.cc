@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -262,6 +263,29 @@ TEST(Run, AWorkerThatDiesAgainAndAgainPausesTheRunWithSlotCauseAndStep) {
   EXPECT_EQ(report.faults(4).recovered_by(), "none: paused");
   // initial state and ten steps of two bodies are kept
   EXPECT_EQ(read_csv(folder.path("motion.csv")).size(), 1U + 11 * 2);
+}
+
+// Who starts a run from a script tells a pause by its exit code, wherever it stands.
+TEST(Run, APauseWhoseCheckpointCannotBeWrittenIsAPauseAndSaysBoth) {
+  const ScratchFolder folder;
+  // where the checkpoint is written before it gets its name, so that root cannot either
+  std::filesystem::create_directory(folder.path("two_spheres_motor.paused.checkpoint.tmp"));
+  const std::vector<std::string> words = {"run", kSample, "--fault", "solver:kill@step=5,times=2"};
+  const ProgramResult result = run_program(words, folder);
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("paused at step 5: slot solver"));
+  EXPECT_THAT(result.err,
+              HasSubstr("no checkpoint could be written: checkpoint 'two_spheres_motor.paused.checkpoint'"));
+}
+
+// Nor is it another end where an output fails, too.
+TEST(Run, APauseIsAPauseWhereAnOutputCannotBeWritten) {
+  const ScratchFolder folder;
+  const ProgramResult result =
+      run_program({"run", kSample, "--fault", "solver:kill@step=5,times=2", "--report", "/dev/full"}, folder);
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("paused at step 5: slot solver"));
+  EXPECT_THAT(result.err, HasSubstr("report '/dev/full': No space left on device"));
 }
 
 TEST(Run, AWorkerThatHangsIsReplacedAtItsDeadline) {

@@ -161,6 +161,21 @@ TEST(Serve, AFaultThatTheRunDidNotSurviveIsExitCode3) {
   EXPECT_THAT(result.out, HasSubstr("checkpoint"));
 }
 
+// Nor is it another one where the checkpoint cannot be written.
+TEST(Serve, AFaultIsExitCode3WithoutACheckpointToo) {
+  const ScratchFolder folder;
+  const std::string kept = folder.path("kept");
+  Served served({"--duration", "1000", "--checkpoint", kept});
+  // where the next one is written before it gets its name
+  std::filesystem::create_directory(kept + ".tmp");
+  ASSERT_EQ(served.ctl({"inject", "integrator:kill,times=2"}).exit_code, 0);
+  for (int i = 0; i < 3000 && served.status().state() != "faulted"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  const ProgramResult result = served.end(SIGTERM);
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("the checkpoint is that of step 0: checkpoint '" + kept + "'"));
+}
+
 TEST(Serve, CtlEditsTheSceneAndWakesABody) {
   Served served({"--duration", "3600", "--paused"});
   ASSERT_FALSE(served.socket().empty());

@@ -185,7 +185,7 @@ TEST(PairDecisions, OneThatStallsIsLeftAsideAtTheDeadlineAndItsLateAnswerIsNotUs
   const Decided decided = decide(head_on(), std::make_shared<Stalls>(end.get_future().share(), &has_ended), 0.05);
   EXPECT_EQ(decided.chain, quiet);
   ASSERT_EQ(decided.problems.size(), 1U);
-  EXPECT_THAT(decided.problems[0], HasSubstr("no answer within 0.05 s about 1 pairs"));
+  EXPECT_THAT(decided.problems[0], HasSubstr("no answer within 0.05 s about 1 pair"));
   end.set_value();
   has_ended.get_future().wait();
 }

@@ -63,6 +63,18 @@ TEST(Summary, AComparisonThatNeverWasSaysWhy) {
                                                "ended: it could not be prepared: no such file\n"));
 }
 
+TEST(Summary, OneIsNotMany) {
+  report::v1::Report report;
+  report.set_steps(1);
+  report.set_bodies(1);
+  report.mutable_events()->set_break_(1);
+  report.mutable_plan()->add_slots()->set_process(1);
+  const std::string text = summarize(report, {});
+  EXPECT_THAT(text, HasSubstr("in 1 step, 1 body, "));
+  EXPECT_THAT(text, HasSubstr("  1 joint broke\n"));
+  EXPECT_THAT(text, HasSubstr("  1 worker process: "));
+}
+
 TEST(Summary, TheTimeOfAStepIsAMedian) {
   report::v1::Report report;
   report.mutable_microseconds_per_step()->set_mean(40.0);

@@ -176,6 +176,16 @@ TEST(Overrides, NameTheirMistakes) {
               ElementsAre("--set Solver=LCP: the scene has no Environment; add one"));
 }
 
+TEST(Overrides, NameTheBeginningThatAPathLacks) {
+  const auto says = [](const std::string& what) {
+    return ElementsAre(testing::HasSubstr("did you mean \"" + what + "\"? Allowed: \"Integrator\", "));
+  };
+  EXPECT_THAT(override_errors_of("Duration=2"), says("Simulator.Duration"));
+  EXPECT_THAT(override_errors_of("Timestep=0.1"), says("Simulator.TimeStep"));
+  EXPECT_THAT(override_errors_of("Ball01.Mass=1"), says("Body.Ball01"));
+  EXPECT_THAT(override_errors_of("Unit.Radius=1"), says("Geometry.Unit"));
+}
+
 TEST(Overrides, ErrorsKnowTheirColumn) {
   const auto column = [](const std::string& one) { return build(kScene, {one}).read.problems.errors.at(0).column; };
   EXPECT_EQ(column("Simulator.TimeStep = 1 2"), 24);

@@ -382,5 +382,17 @@ TEST_F(ReaderFiles, ThatCannotBeReadAreErrors) {
                           paths[1] + ":1:1: error: cannot be read: it is a folder; a scene is a readable text file"));
 }
 
+// `--set Body.Ball.Position={0,1,0}` without quotes is three words, of which two are taken for scenes.
+TEST_F(ReaderFiles, ThatAreLeftOfAnOverrideAreToldAsThat) {
+  for (const std::string word : {"Body.Ball.Position=1", "1,", "0}"}) {
+    SceneDocument document;
+    Problems problems;
+    EXPECT_FALSE(read_files(std::vector{word}, &document, &problems));
+    EXPECT_THAT(texts(problems.errors),
+                ElementsAre(testing::EndsWith("a --set with braces is quoted, or the shell splits it: --set "
+                                              "'Body.Ball.Position={0,1,0}'")));
+  }
+}
+
 }  // namespace
 }  // namespace gravitas::scene
