@@ -46,8 +46,7 @@ std::vector<std::string> Environment::warnings() {
 }
 
 Pose Environment::pose_of(const Column<double>& position, const Column<double>& orientation, std::uint32_t body) const {
-  if (body == kNone) return {};
-  return {vector_at(position.span(), body), quaternion_at(orientation.span(), body)};
+  return body == kNone ? Pose{} : Pose{vector_at(position.span(), body), quaternion_at(orientation.span(), body)};
 }
 
 Trusted<TrialState> Environment::integrate(bool may_be_refused) {

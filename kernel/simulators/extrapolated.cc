@@ -105,13 +105,13 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       }
       put(this->front(), states_[front], model_.body_count, &extrapolation_);
       const double now = extrapolation_.add();
-      go_back();
       jumps_.add();
-      const double jump = jumps_.least_size();
-      if (std::max(now, jump) <= description_.accuracy && pieces > first) enough = pieces;
+      if (std::max(now, jumps_.least_size()) <= description_.accuracy && pieces > first) enough = pieces;
+      const bool breaks = enough > 0 && of_jump > 0.0 && breaks_away(begin + length, length, pieces);
+      go_back();
+      if (breaks) return 0;
       const bool converges = pieces <= 2 || now <= std::max(kConverges * error, kSettled * description_.accuracy);
-      error = now;
-      if (!converges) break;
+      if (error = now; !converges) break;
     }
     if (enough > 0 && sees_jumps && hides_jump(begin, length, first, enough, error)) enough = 0;
     go_back();

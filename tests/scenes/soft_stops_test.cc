@@ -196,9 +196,9 @@ TEST(SoftStopsOfSmooth, AreMetAnywhereInAStep) {
   const double h = 1.0 / 60.0, damping = 3.0 * kSoftMass / h;
   for (int place = 0; place < 40; ++place) {
     const double limit = h * (3.0 + (place + 0.5) / 40.0);
-    SceneRun run(soft_scene(soft_guide(-1.0, limit, 0.5 * damping * damping, damping), h, 0.2, {0, 1, 0}, false,
-                            "Smooth"),
-                 {set("Integrator", "ImplicitMidpoint"), set("Solver", "Newton")});
+    SceneRun run(
+        soft_scene(soft_guide(-1.0, limit, 0.5 * damping * damping, damping), h, 0.2, {0, 1, 0}, false, "Smooth"),
+        {set("Integrator", "ImplicitMidpoint"), set("Solver", "Newton")});
     run.to_end();
     EXPECT_GE(run.body("A").twist.linear.y(), -1.0) << place;
     EXPECT_LE(run.body("A").twist.linear.y(), 1e-3) << place;

@@ -1,0 +1,71 @@
+// Where static friction gives way on the way of a part of an extrapolated step (extrapolated.cc): what rests begins to slide, roll or
+// spin, and friction falls to the dynamic one. In the last quarter of the part attempts in one and in two inner steps both miss it,
+// since each inner step weighs what acts in all of it, and agree on a rest that is over.
+//
+// One inner step more tells: what rests where the part ends, and does not then, may have begun before. It is as long as the others:
+// of what is redundant, a solver goes on with the solution that it has, and may find another for a step of another length.
+#include "kernel/environment.h"
+#include "plugin_sdk/event_location.h"
+#include "plugin_sdk/solver.h"
+
+namespace gravitas::kernel {
+namespace {
+
+constexpr double kLoaded = 0.1;   // share of the largest friction that a contact bears, at least
+constexpr double kAtRest = 0.01;  // of the accuracy, m/s or rad/s: slower is at rest
+
+}  // namespace
+
+// Whether what rests at the end of the attempt in front() gains more than the accuracy in a time as long as the part.
+bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
+  const double accuracy = description_.accuracy;
+  const auto bears = [&](std::size_t i) {
+    const Vector3 normal = vector_at(data_.contact_normal.span(), i),
+                  impulse = vector_at(data_.contact_impulse.span(), i);
+    const double pressed = normal.dot(impulse),
+                 most = data_.contact_material[kMaterialColumns * i + kStaticFriction] * pressed;
+    return pressed > 0.0 && ((impulse - pressed * normal).norm() > kLoaded * most ||
+                             !vector_at(data_.contact_turning.span(), i).isZero(0.0));
+  };
+  const auto any_bears = [&] {
+    for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
+      if (bears(i)) return true;
+    return false;
+  };
+  if (!any_bears()) return false;
+  if (!make_piece(end, length, 0, pieces) || must_restart_) return true;
+  find_changes(&trial_changes_);
+  if (lets_go()) return false;
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+    if (!bears(i)) continue;
+    const std::uint32_t* pair = &data_.contact_body[2 * i];
+    const Vector3 point = vector_at(data_.contact_point.span(), i), normal = vector_at(data_.contact_normal.span(), i);
+    const auto motion = [&](std::uint32_t body) {
+      return TrialMotion{
+          pose_of(front().position, front().orientation, body),
+          pose_of(data_.trial_position, data_.trial_orientation, body),
+          {vector_at(start_linear_velocity().span(), body), vector_at(start_angular_velocity().span(), body)}};
+    };
+    const auto after = [&](std::uint32_t body) {
+      return Vector3(vector_at(data_.solved_linear_velocity.span(), body) +
+                     vector_at(data_.solved_angular_velocity.span(), body)
+                         .cross(point - vector_at(data_.trial_position.span(), body)));
+    };
+    const auto turning = [&](const Column<double>& angular) {
+      return (vector_at(angular.span(), pair[1]) - vector_at(angular.span(), pair[0])).norm();
+    };
+    const auto begins = [&](double before, double then) {
+      return before <= kAtRest * accuracy && (then - before) * pieces > accuracy;
+    };
+    const Vector3 apart = after(pair[1]) - after(pair[0]);
+    const double* material = &data_.contact_material[kMaterialColumns * i];
+    const bool may_turn = material[kRollingFriction] > 0.0 || material[kSpinningFriction] > 0.0;
+    if (begins(start_slip(point, point, normal, motion(pair[0]), motion(pair[1])).norm(),
+               (apart - normal.dot(apart) * normal).norm()) ||
+        (may_turn && begins(turning(start_angular_velocity()), turning(data_.solved_angular_velocity))))
+      return true;
+  }
+  return false;
+}
+
+}  // namespace gravitas::kernel
