@@ -11,16 +11,14 @@ namespace {
 
 // Faces and lines within this of lying flat on each other touch as such (sine of the angle): where an edge meets a face or
 // another edge, the rest of two faces that are nearly parallel is known to the solver, too, else bodies rock from edge to
-// edge. So near a face's normal may be preferred to the least, too. Of rounded cores the surface lies elsewhere.
+// edge. So near a face's normal may be preferred to the least, too.
 constexpr double kFlat = 0.2;
-constexpr double kFlatRounded = 0.03;
 constexpr double kFacePreference = 0.01;
 constexpr double kFaceTie = 1e-7;
 
 // Features within this angle (its sine) of the plane touch as such: at the far end of a tilted face the gap decides. Of a
-// rounded core the point below its far end lies under the surface by half the square of the angle, times the radius.
+// rounded core the gap there is told too large by half the square of the angle, times the radius: less than what tilts it.
 constexpr double kFacing = 0.2;
-constexpr double kFacingRounded = 0.03;
 
 using Vector2 = Eigen::Vector2d;
 
@@ -160,13 +158,13 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
   if (!(least.depth >= -margin)) return;
   const double tie = std::max(1e-9 * pair.thinnest(), 1e-14 * pair.reach());
 
-  const auto contours = [&](const Vector3& n, double sine, double sine_rounded, Contour* a, Contour* b) {
-    pair.a.contour(n, pair.a.rounding() > 0.0 ? sine_rounded : sine, a);
-    pair.b.contour(pair.R_AB.transpose() * -n, pair.b.rounding() > 0.0 ? sine_rounded : sine, b);
+  const auto contours = [&](const Vector3& n, double sine, Contour* a, Contour* b) {
+    pair.a.contour(n, sine, a);
+    pair.b.contour(pair.R_AB.transpose() * -n, sine, b);
     place_contour(pair.R_AB, pair.p_AB, b);
   };
   Contour a, b;
-  contours(least.normal, kFlat, kFlat, &a, &b);
+  contours(least.normal, kFlat, &a, &b);
   // a face of a before one of b, and both before the least, unless the later is shallower by more than the preference
   Vector3 normal = least.normal;
   double depth = least.depth;
@@ -186,13 +184,13 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
   const double equal = std::max(1e-6 * pair.thinnest(), tie);
   const auto try_normal = [&](const Vector3& n, double wanted) {
     candidates.clear();
-    contours(n, kFlat, kFlatRounded, &a, &b);
+    contours(n, kFlat, &a, &b);
     add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
     return candidates.deepest() >= wanted - equal;
   };
   if (!try_normal(normal, depth) && (normal == least.normal || !try_normal(least.normal, least.depth))) {
     // the deepest place lies beside the features: the points that touch there
-    contours(least.normal, 0.0, 0.0, &a, &b);
+    contours(least.normal, 0.0, &a, &b);
     const Vector3& n = least.normal;
     const Vector3 middle = 0.5 * (least.point_a + least.point_b);
     const double level =
@@ -213,7 +211,7 @@ void collide_halfspace_support_map(const Vector3& up, const SupportMap& map, con
     candidates.add({x + (0.5 * depth) * up, up, depth, code});
   };
   Contour contour;
-  map.contour(down, map.rounding() > 0.0 ? kFacingRounded : kFacing, &contour);
+  map.contour(down, kFacing, &contour);
   // of a feature that does not lie flat the deepest point may be another
   double deepest = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < contour.count; ++i) deepest = std::max(deepest, down.dot(contour.points[i]));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -103,6 +104,37 @@ TEST(FlatImpact, TumblesNothingWhoseSlideItStops) {
       EXPECT_LT(spin, 1e-9) << time_step;
     }
   }
+}
+
+// A thin rod, tipped, falls flat on a floor: the end that is still up where the other meets it is known, too. It went 33 mm into the
+// floor at 1/60 s, and rocked for six steps.
+TEST(Rod, FallsFlat) {
+  for (const std::string floor :
+       {"Type = \"Halfspace\"", "Type = \"Box\" CustomProperties { HalfExtents = {2, 1, 2} }"})
+    for (const double tilt : {0.1, 0.25, 0.53}) {
+      const double base = floor.find("Box") == std::string::npos ? 0.0 : -1.0;
+      SceneRun run(
+          "Geometries { Geometry { " + floor +
+          " Id = \"Floor\" } Geometry { Type = \"Capsule\" Id = \"Rod\" CustomProperties { Radius = 0.01 Height = 1 } "
+          "} }\n"
+          "Materials { Material { Id = \"M\" StaticFrictionCoefficient = 0.76 } }\n"
+          "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+          "Simulator { CustomProperties { TimeStep = 0.0166666666666666 Duration = 0.5 SleepEnergy = 0 } }\n"
+          "Environment { Space { Bodies { Body { Id = \"F\" GeometryId = \"Floor\" Material = \"M\" "
+          "Immovable = true KineticProperties { Position = " +
+          literal(Vector3(0, base, 0)) +
+          " } } Body { Id = \"R\" GeometryId = \"Rod\" Material = \"M\" Mass = 1 Forces = {\"G\"} "
+          "KineticProperties { Position = " +
+          literal(Vector3(0, 0.5 * std::sin(tilt) + 0.0101, 0)) +
+          " Orientation = " + literal(harness::turned(Vector3::UnitZ(), tilt - 0.5 * kPi)) + " } } } } }");
+      while (!run.is_done()) {
+        run.step();
+        const Pose pose = run.body("R").pose;
+        const double rise = 0.5 * std::fabs((pose.orientation * Vector3::UnitY()).y());
+        ASSERT_GE(pose.position.y() - rise - 0.01, -1e-4) << tilt << ' ' << floor << ' ' << run.time();
+      }
+      EXPECT_NEAR(run.body("R").pose.position.y(), 0.01, 1e-6) << tilt << ' ' << floor;
+    }
 }
 
 }  // namespace

@@ -28,12 +28,12 @@ const SupportMap& support_map_of(const Shape& shape, SupportMapBuffer* buffer) {
 
 void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out,
                     const FeatureTest& is_dropped) {
-  constexpr double kFlat = 0.2, kFlatRounded = 0.03;
+  constexpr double kFlat = 0.2;
   const double tie = std::max(1e-9 * pair.thinnest(), 1e-13 * pair.reach());
   ContactCandidates candidates(margin, tie, std::max(1e-6 * pair.thinnest(), tie));
   Contour a, b;
-  pair.a.contour(n, pair.a.rounding() > 0.0 ? kFlatRounded : kFlat, &a);
-  pair.b.contour(pair.R_AB.transpose() * -n, pair.b.rounding() > 0.0 ? kFlatRounded : kFlat, &b);
+  pair.a.contour(n, kFlat, &a);
+  pair.b.contour(pair.R_AB.transpose() * -n, kFlat, &b);
   place_contour(pair.R_AB, pair.p_AB, &b);
   add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
   if (candidates.count() == 0 && least != nullptr)
