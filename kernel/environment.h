@@ -190,13 +190,13 @@ class Environment : private DerivativeSource, private SlotObserver {
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
   bool locates_events() const { return has_contacts() && description_.simulator >= Simulator::kBisection; }
   void locate_events(double begin, double length);
-  // extrapolated.cc, jumps.cc, breakaways.cc
-  void extrapolate_parts(double begin, double length);
+  void extrapolate_parts(double begin, double length);  // extrapolated.cc, jumps.cc, breakaways.cc
   std::uint32_t pieces_to_accuracy(double begin, double length, bool is_before_impact, bool ends_with_impact);
   bool make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces);
   std::span<const double> take_extrapolated();
   void find_changes(std::vector<double>* changes);
   bool lets_go() const;
+  void open_parting_contacts();  // limits.cc
   bool breaks_away(double end, double length, std::uint32_t pieces);
   bool hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error);
   // The inner step that ends at the next event, of at most `length`, for which S* is in place.

@@ -20,6 +20,8 @@ constexpr double kAtStart = 1e-9, kShort = 1e-3;  // of a trial: what tells gaps
 constexpr double kRough = 0.5;                    // a trial is looked at again where a gap closes in less of it
 constexpr double kSlop = 1e-9;                    // of the arm, m, or rad: gap that solvers take for none
 constexpr double kOpen = 1e-12;                   // m or rad
+constexpr double kRolling = 1e-5;                 // m/s: slower parting may be of what rolls
+constexpr double kNextToNothing = 1e-7;           // of the step
 
 }  // namespace
 
@@ -63,6 +65,25 @@ double Environment::first_limit(double begin, double length, bool* passes) {
     if (stop >= kRough * trial || stop <= kAtStart * length) break;
   }
   return stop;
+}
+
+// In an inner step of next to no length, as those that pass a limit are, what has just bounced off is not pressed. Where the limit
+// stops it, it arrives anew in the next one, with its restitution: here it would go away, and have nothing to bounce with.
+void Environment::open_parting_contacts() {
+  const double accuracy = description_.accuracy, step = length_of_step(step_count_ + 1);
+  if (!(accuracy > 0.0) || data_.time_step[0] > std::max(kNextToNothing * step, kBeyond * kNear * accuracy)) return;
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+    const Vector3 point = vector_at(data_.contact_point.span(), i);
+    const auto velocity = [&](std::uint32_t body) {
+      return Vector3(
+          vector_at(start_linear_velocity().span(), body) +
+          vector_at(start_angular_velocity().span(), body).cross(point - vector_at(front().position.span(), body)));
+    };
+    const Vector3 parting = velocity(data_.contact_body[2 * i + 1]) - velocity(data_.contact_body[2 * i]);
+    if (vector_at(data_.contact_normal.span(), i).dot(parting) > std::max(kSlow * accuracy, kRolling))
+      data_.contact_depth[i] = -data_.margin[0],
+      set_vector(data_.contact_warm_impulse.span(), static_cast<std::uint32_t>(i), Vector3::Zero());
+  }
 }
 
 }  // namespace gravitas::kernel

@@ -348,5 +348,33 @@ TEST(BounceWhereItIsMet, DoesNotMindASlideThatEndsElsewhere) {
   EXPECT_NEAR(velocity_after(box), wanted, 1e-6);
 }
 
+// A heavy ball throws a block against its stop, some nm away, and goes on: by then it has bounced once, and arrives at a block that
+// stands. It stopped dead in one of twelve such places, as one that had pressed before.
+TEST(BounceAtAStop, IsOneOfItsOwn) {
+  constexpr double kBall = 4.0, kBlock = 0.5, e = 0.6;
+  int places = 0;
+  for (const double speed : {1.3, 2.0, 3.1})
+    for (double gap = 1e-9; gap < 6e-9; gap *= 1.13) {
+      ++places;
+      const double share = (1.0 + e) * kBlock / (kBall + kBlock), on = speed * (1.0 - share);
+      SceneRun run(
+          "Geometries { Geometry { Type = \"Sphere\" Id = \"S\" CustomProperties { Radius = 0.1 } } Geometry { Type "
+          "= \"Box\" Id = \"B\" CustomProperties { HalfExtents = {0.1, 0.1, 0.1} } } }\n"
+          "Materials { Material { Id = \"M\" RestitutionCoefficient = 0.6 StaticFrictionCoefficient = 0 } }\n"
+          "Simulator { Type = \"Continuous\" CustomProperties { TimeStep = 0.0166666666666666 Duration = 0.15 "
+          "Accuracy = 1e-5 } }\nEnvironment { Space { Bodies { Body { Id = \"Block\" GeometryId = \"B\" Material = "
+          "\"M\" Mass = 0.5 KineticProperties { Position = {0.2, 0, 0} } }\n"
+          "Body { Id = \"Ball\" GeometryId = \"S\" Material = \"M\" Mass = 4 KineticProperties { Position = {-0.1, "
+          "0, 0} LinearVelocity = {" +
+          literal(speed) +
+          ", 0, 0} } } } } Constraints { Constraint { Type = \"Slider\" Id = \"J\" Body2 = \"Block\" "
+          "CustomProperties { BindPoint = {0.2, 0, 0} Axis = {1, 0, 0} UpperLimit = " +
+          literal(gap) + " } } } ConstraintSolver = \"Newton\" }");
+      run.to_end();
+      EXPECT_NEAR(run.body("Ball").twist.linear.x(), -e * on, 1e-6) << speed << ' ' << gap;
+    }
+  EXPECT_EQ(places, 45);
+}
+
 }  // namespace
 }  // namespace gravitas
