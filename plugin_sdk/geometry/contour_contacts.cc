@@ -16,13 +16,21 @@ constexpr double kFlat = 0.2;
 constexpr double kFacePreference = 0.01;
 constexpr double kFaceTie = 1e-7;
 
-// Features within this angle (its sine) of the plane touch as such: at the far end of a tilted face the gap decides. Of a
-// rounded core the gap there is told too large by half the square of the angle, times the radius: less than what tilts it.
+// Features within this angle (its sine) of the plane touch as such: at the far end of a tilted face the gap decides.
 constexpr double kFacing = 0.2;
 
 using Vector2 = Eigen::Vector2d;
 
 double cross(const Vector2& u, const Vector2& v) { return u.x() * v.y() - u.y() * v.x(); }
+
+// How far along the normal the surface of a rounded line lies from its core, `from_end` of the `run` that the line has across the
+// normal from the end that is nearer to the surface; it rises by `rise` along the normal.
+double rounded_height(double radius, double rise, double run, double from_end) {
+  if (!(run > 0.0)) return radius;
+  const double slope = rise / run, stretch = std::sqrt(1.0 + slope * slope);
+  const double of_cap = radius * slope / stretch;  // where the ball around that end is the surface
+  return from_end < of_cap ? from_end * slope + std::sqrt(radius * radius - from_end * from_end) : radius * stretch;
+}
 
 // A contour seen along the normal.
 class FlatContour {
@@ -71,7 +79,16 @@ class FlatContour {
     }
     return normal_.dot(at) + contour_.normal.dot(contour_.points[0] - at) / contour_.normal.dot(normal_);
   }
-  double rounding() const { return rounding_; }
+  // With it: on the side where the normal points to, or (`side` = -1) the other.
+  double surface(const Vector2& x, const Vector3& at, double side) const {
+    double rounding = rounding_;
+    if (count() == 2 && rounding > 0.0) {
+      const double rise = side * normal_.dot(contour_.points[1] - contour_.points[0]);
+      const double run = (points_[1] - points_[0]).norm(), t = std::clamp(along_line(x), 0.0, 1.0);
+      rounding = rounded_height(rounding, std::fabs(rise), run, run * (rise > 0.0 ? 1.0 - t : t));
+    }
+    return height(x, at) + side * rounding;
+  }
 
  private:
   double along_line(const Vector2& x) const {
@@ -99,7 +116,7 @@ struct Patch {
 
   void add(const Vector3& at, std::uint32_t feature) const {
     const Vector2 x(basis.first.dot(at), basis.second.dot(at));
-    const double high = a.height(x, at) + a.rounding(), low = b.height(x, at) - b.rounding();
+    const double high = a.surface(x, at, 1.0), low = b.surface(x, at, -1.0);
     out->add({at + normal * (0.5 * (high + low) - normal.dot(at)), normal, high - low, feature});
   }
 };
@@ -205,8 +222,8 @@ void collide_halfspace_support_map(const Vector3& up, const SupportMap& map, con
   const Vector3 down = -(R.transpose() * up);
   const double tie = 1e-9 * map.thinnest();
   ContactCandidates candidates(margin, tie, tie);
-  const auto add = [&](const Vector3& point, std::uint32_t code) {
-    const Vector3 x = p + R * point - map.rounding() * up;
+  const auto add = [&](const Vector3& point, std::uint32_t code, double rounding) {
+    const Vector3 x = p + R * point - rounding * up;
     const double depth = -up.dot(x);
     candidates.add({x + (0.5 * depth) * up, up, depth, code});
   };
@@ -219,9 +236,16 @@ void collide_halfspace_support_map(const Vector3& up, const SupportMap& map, con
   if (down.dot(support) > deepest + tie) {
     Contour point;
     map.contour(down, 0.0, &point);
-    add(support, point.count == 1 ? point.codes[0] : 0x7FFFU);
+    add(support, point.count == 1 ? point.codes[0] : 0x7FFFU, map.rounding());
   }
-  for (std::size_t i = 0; i < contour.count; ++i) add(contour.points[i], contour.codes[i]);
+  const bool is_line = contour.count == 2 && map.rounding() > 0.0;
+  const Vector3 line = is_line ? Vector3(contour.points[1] - contour.points[0]) : Vector3(Vector3::Zero());
+  const double fall = down.dot(line), run = (line - fall * down).norm();
+  for (std::size_t i = 0; i < contour.count; ++i) {
+    const bool is_upper = is_line && (i == 0) == (fall > 0.0);
+    add(contour.points[i], contour.codes[i],
+        is_upper ? rounded_height(map.rounding(), std::fabs(fall), run, run) : map.rounding());
+  }
   candidates.reduce_to(out);
 }
 
