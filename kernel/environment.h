@@ -190,13 +190,13 @@ class Environment : private DerivativeSource, private SlotObserver {
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
   bool locates_events() const { return has_contacts() && description_.simulator >= Simulator::kBisection; }
   void locate_events(double begin, double length);
-  void extrapolate_parts(double begin, double length);  // extrapolated.cc, jumps.cc, breakaways.cc
+  // extrapolated.cc, jumps.cc, breakaways.cc
+  void extrapolate_parts(double begin, double length);
   std::uint32_t pieces_to_accuracy(double begin, double length, bool is_before_impact, bool ends_with_impact);
   bool make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces);
   std::span<const double> take_extrapolated();
   void find_changes(std::vector<double>* changes);
   bool lets_go() const;
-  void open_parting_contacts();  // limits.cc
   bool breaks_away(double end, double length, std::uint32_t pieces);
   bool hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error);
   // The inner step that ends at the next event, of at most `length`, for which S* is in place.
@@ -204,6 +204,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   double first_limit(double begin, double length, bool* passes);                                            // limits.cc
+  void open_parting_contacts();                                                                             // limits.cc
   // loads.cc: by what loads turn a jointed body in the inner step, rad, and which; true where the step starts again, finer.
   std::pair<double, std::uint32_t> largest_turn_by_loads() const;
   bool makes_step_finer();
@@ -240,9 +241,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   void meet_stops(double begin, double length);
   double next_stop(const Trusted<TrialState>& trial, double begin, double length, double* crossing);
   void find_stops(bool of_trial, std::vector<StopGap>* stops) const;
-  void note_what_joints_bear();  // openings.cc
-  Trusted<TrialState> integrate_shorter(double begin, double* length);
-  double length_of_flight(double begin, double length);  // of a stop that opens and is pressed again
+  void note_what_joints_bear();                                         // openings.cc
+  Trusted<TrialState> integrate_shorter(double begin, double* length);  // openings.cc
+  double length_of_flight(double begin, double length);                 // of a stop that opens and is pressed again
   // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
   std::uint64_t most_reaction_blocks() const;
 

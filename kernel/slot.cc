@@ -178,7 +178,8 @@ void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attem
   // nor if its process failed in a call of another slot, which others answer by now
   if (attempts->asked && attempts->asked != host.carrier() && ++attempts->made < SlotDescription::kBudget) return;
   attempts->asked.reset();  // else its worker's end would be waited for here
-  const bool is_answer = call.may_be_refused && fault.kind == FaultKind::kRefusal;
+  const bool is_answer = call.may_be_refused && fault.kind == FaultKind::kRefusal && !host.is_on_probation();
+  if (is_answer) note_recovery(*attempts), host.count_good_answer(which_);
   if (is_answer || !description_.defences.replay) {
     name(&fault, call.target);
     throw StageFault(fault);

@@ -31,11 +31,10 @@ void Environment::book_check(Stage stage) {
 
 std::vector<std::string> Environment::warnings() {
   std::vector<std::string> lines;
-  for (std::size_t i = 0; i < overrun_ns_.size(); ++i) {
-    if (overrun_ns_[i] == 0) continue;
-    lines.push_back(std::string("stage ") + kStageNames[i] + " took " + std::to_string(overrun_ns_[i] / 1'000'000) +
-                    " ms in a call, longer than its deadline; direct hosting cannot interrupt it");
-  }
+  for (std::size_t i = 0; i < overrun_ns_.size(); ++i)
+    if (overrun_ns_[i] > 0)
+      lines.push_back(std::string("stage ") + kStageNames[i] + " took " + std::to_string(overrun_ns_[i] / 1'000'000) +
+                      " ms in a call, longer than its deadline; direct hosting cannot interrupt it");
   if (const auto [turn, body] = std::exchange(turned_far_, {}); turn > 0.0) lines.push_back(why_turned_far(turn, body));
   if (const auto [share, step] = std::exchange(taken_by_joints_, {}); share > 0.0)
     lines.push_back(why_joints_took(share, step));

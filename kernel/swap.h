@@ -34,8 +34,7 @@ struct SwapRecord {
   std::uint32_t step;    // first step that the new host makes
   std::string from, to;  // plugins, with library and hosting where these change
   bool only_compared = false;
-  // Of a comparison: the step from which on `from` answers; 0: since it began. What was counted beside others before is a
-  // record of its own.
+  // Of a comparison: the step from which on `from` answers; 0: since it began. Of others before there is another record.
   std::uint32_t since = 0;
   SwapState state = SwapState::kPreparing;
   std::string reason;     // why it was refused or rolled back

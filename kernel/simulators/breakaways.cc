@@ -19,25 +19,29 @@ constexpr double kAtRest = 0.01;  // of the accuracy, m/s or rad/s: slower is at
 // Whether what rests at the end of the attempt in front() gains more than the accuracy in a time as long as the part.
 bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
   const double accuracy = description_.accuracy;
-  const auto bears = [&](std::size_t i) {
-    const Vector3 normal = vector_at(data_.contact_normal.span(), i),
-                  impulse = vector_at(data_.contact_impulse.span(), i);
-    const double pressed = normal.dot(impulse),
-                 most = data_.contact_material[kMaterialColumns * i + kStaticFriction] * pressed;
-    return pressed > 0.0 && ((impulse - pressed * normal).norm() > kLoaded * most ||
-                             !vector_at(data_.contact_turning.span(), i).isZero(0.0));
+  const auto pressed = [&](std::size_t i) {
+    return vector_at(data_.contact_normal.span(), i).dot(vector_at(data_.contact_impulse.span(), i));
   };
-  const auto any_bears = [&] {
-    for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
-      if (bears(i)) return true;
-    return false;
+  const auto coefficient = [&](std::size_t i, MaterialColumn column) {
+    return data_.contact_material[kMaterialColumns * i + column];
   };
-  if (!any_bears()) return false;
+  const auto may_turn = [&](std::size_t i) {
+    return coefficient(i, kRollingFriction) > 0.0 || coefficient(i, kSpinningFriction) > 0.0;
+  };
+  bool any_bears = false;
+  for (std::size_t i = 0; i < data_.contact_key.size() && !any_bears; ++i) {
+    const Vector3 impulse = vector_at(data_.contact_impulse.span(), i);
+    const Vector3 across = impulse - pressed(i) * vector_at(data_.contact_normal.span(), i);
+    any_bears = across.norm() > kLoaded * coefficient(i, kStaticFriction) * pressed(i) ||
+                !vector_at(data_.contact_turning.span(), i).isZero(0.0);
+  }
+  if (!any_bears) return false;
   if (!make_piece(end, length, 0, pieces) || must_restart_) return true;
   find_changes(&trial_changes_);
   if (lets_go()) return false;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
-    if (!bears(i)) continue;
+    // what has given way bears next to nothing where dynamic friction is small
+    if (!(pressed(i) > 0.0) || !(coefficient(i, kStaticFriction) > 0.0 || may_turn(i))) continue;
     const std::uint32_t* pair = &data_.contact_body[2 * i];
     const Vector3 point = vector_at(data_.contact_point.span(), i), normal = vector_at(data_.contact_normal.span(), i);
     const auto motion = [&](std::uint32_t body) {
@@ -58,11 +62,9 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
       return before <= kAtRest * accuracy && (then - before) * pieces > accuracy;
     };
     const Vector3 apart = after(pair[1]) - after(pair[0]);
-    const double* material = &data_.contact_material[kMaterialColumns * i];
-    const bool may_turn = material[kRollingFriction] > 0.0 || material[kSpinningFriction] > 0.0;
     if (begins(start_slip(point, point, normal, motion(pair[0]), motion(pair[1])).norm(),
                (apart - normal.dot(apart) * normal).norm()) ||
-        (may_turn && begins(turning(start_angular_velocity()), turning(data_.solved_angular_velocity))))
+        (may_turn(i) && begins(turning(start_angular_velocity()), turning(data_.solved_angular_velocity))))
       return true;
   }
   return false;

@@ -107,11 +107,11 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       const double now = extrapolation_.add();
       jumps_.add();
       if (std::max(now, jumps_.least_size()) <= description_.accuracy && pieces > first) enough = pieces;
-      const bool breaks = enough > 0 && of_jump > 0.0 && breaks_away(begin + length, length, pieces);
+      if (enough > 0 && of_jump > 0.0 && breaks_away(begin + length, length, pieces)) return go_back(), 0;
       go_back();
-      if (breaks) return 0;
       const bool converges = pieces <= 2 || now <= std::max(kConverges * error, kSettled * description_.accuracy);
-      if (error = now; !converges) break;
+      error = now;
+      if (!converges) break;
     }
     if (enough > 0 && sees_jumps && hides_jump(begin, length, first, enough, error)) enough = 0;
     go_back();

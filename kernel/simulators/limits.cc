@@ -68,7 +68,7 @@ double Environment::first_limit(double begin, double length, bool* passes) {
 }
 
 // In an inner step of next to no length, as those that pass a limit are, what has just bounced off is not pressed. Where the limit
-// stops it, it arrives anew in the next one, with its restitution: here it would go away, and have nothing to bounce with.
+// stops it, it arrives anew in the next one, with its restitution: pressed here it would lose its speed, and restitution act on nothing.
 void Environment::open_parting_contacts() {
   const double accuracy = description_.accuracy, step = length_of_step(step_count_ + 1);
   if (!(accuracy > 0.0) || data_.time_step[0] > std::max(kNextToNothing * step, kBeyond * kNear * accuracy)) return;

@@ -32,12 +32,14 @@ void Environment::note_what_joints_bear() {
 
 // A trial that holds stops which it has left long ago may come to where no integrator can follow it: half of it is tried then.
 Trusted<TrialState> Environment::integrate_shorter(double begin, double* length) {
-  for (int halvings = 0;; ++halvings, *length *= 0.5) try {
-      begin_inner_step(begin, *length);
+  for (int halvings = 0;; ++halvings, *length *= 0.5) {
+    begin_inner_step(begin, *length);
+    try {
       return integrate(halvings < kMostHalvings);
     } catch (const StageFault& fault) {
       if (halvings == kMostHalvings || fault.kind != FaultKind::kRefusal || fault.slot != Slot::kIntegrator) throw;
     }
+  }
 }
 
 // Where stops are pressed again in S*: how long an inner step is that ends while they are open. In end_stops_ are the stops where it

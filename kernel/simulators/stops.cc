@@ -16,8 +16,8 @@
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kManyMeetings = 10, kMostMeetings = 1000, kMostLooks = 100;
-constexpr double kReach = 4.0;         // of the inner step before: how long a trial is where many stops are met
+constexpr int kManyInnerSteps = 10, kMostMeetings = 1000, kMostLooks = 100;
+constexpr double kReach = 4.0;         // of the inner step before: how long a trial is after many, or a refusal
 constexpr double kCrossing = 1e-9;     // of the step, that an inner step which passes a stop is long
 constexpr double kShortestHop = 1e-6;  // of the step
 constexpr double kLeadGap = 1e-8;      // of its reach: gap at which a step ends before a stop
@@ -32,7 +32,7 @@ void Environment::meet_stops(double begin, double length) {
     const double asked = std::min(crossing > 0.0 ? crossing : inner < kMostMeetings ? reach : left, left);
     double stop = asked;
     Trusted<TrialState> trial = integrate_shorter(begin + done, &stop);
-    const bool is_short = stop < asked || inner >= kManyMeetings;
+    const bool is_short = stop < asked || reach < length || inner >= kManyInnerSteps;
     if (crossing == 0.0 && inner < kMostMeetings) {
       stop = next_stop(trial, begin + done, stop, &crossing);
       if (is_short) reach = kReach * stop;

@@ -207,6 +207,7 @@ void Figures::follow(kernel::Environment* environment) {
 }
 
 void Figures::begin_again(kernel::Environment* environment) {
+  last_.reset();
   drives_.clear();
   find_drives();
   measure(environment);

@@ -39,8 +39,8 @@ class CpuClock {
   void follow(int process_id) {
     if (std::ranges::find(others_, process_id, &Other::process_id) != others_.end()) return;
     Other other{process_id, 0, 0.0, 0.0};
-    // one of another machine's has none
-    if (clock_getcpuclockid(process_id, &other.clock) != 0) return;
+    // whose process is not known has none: 0 would be this one
+    if (process_id <= 0 || clock_getcpuclockid(process_id, &other.clock) != 0) return;
     other.begin = other.last = seconds_of(other.clock).value_or(0.0);
     others_.push_back(other);
   }

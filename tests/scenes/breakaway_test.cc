@@ -54,10 +54,12 @@ INSTANTIATE_TEST_SUITE_P(By, Breakaway, ::testing::Values("Newton", "Direct", "S
 TEST_P(Breakaway, FromStaticToDynamicFriction) {
   if (std::string(GetParam()) == "Sequential") GTEST_SKIP() << "its corners share the load unevenly, and go one by one";
   const double weight = kPushedMass * kG;
-  for (const double still : {0.42, 0.6, 0.73})
-    expect_found(pushed("Type = \"Box\" CustomProperties { HalfExtents = {0.3, 0.03, 0.3} }", 0.03,
-                        "StaticFrictionCoefficient = " + literal(still) + " DynamicFrictionCoefficient = 0.2"),
-                 still * weight, 0.2 * weight, kPushedMass);
+  for (const double moving : {0.2, 0.02, 0.0})
+    for (const double still : {0.42, 0.6, 0.73})
+      expect_found(
+          pushed("Type = \"Box\" CustomProperties { HalfExtents = {0.3, 0.03, 0.3} }", 0.03,
+                 "StaticFrictionCoefficient = " + literal(still) + " DynamicFrictionCoefficient = " + literal(moving)),
+          still * weight, moving * weight, kPushedMass);
 }
 
 // Nothing jumps where the two are equal.

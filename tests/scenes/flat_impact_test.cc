@@ -108,7 +108,7 @@ TEST(FlatImpact, TumblesNothingWhoseSlideItStops) {
 
 // A thin rod, tipped, falls flat on a floor: the end that is still up where the other meets it is known, too. It went 33 mm into the
 // floor at 1/60 s, and rocked for six steps.
-TEST(Rod, FallsFlat) {
+TEST(FlatImpact, OfAThinRod) {
   for (const std::string floor :
        {"Type = \"Halfspace\"", "Type = \"Box\" CustomProperties { HalfExtents = {2, 1, 2} }"})
     for (const double tilt : {0.1, 0.25, 0.53}) {

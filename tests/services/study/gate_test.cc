@@ -290,7 +290,7 @@ TEST(StudyProgram, WritesWhatItMeasuredAndFailsByItsGate) {
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_THAT(result.out,
               AllOf(HasSubstr("\"failures\": ["), HasSubstr("at most 1e-30 is wanted"), HasSubstr("\"demands\": 1")));
-  EXPECT_THAT(read_file(out + "/STUDY.md"), HasSubstr("Gate: the gate failed, of 1 demands:"));
+  EXPECT_THAT(read_file(out + "/STUDY.md"), HasSubstr("Gate: the gate failed, of 1 demand:"));
 
   words.back() = folder.write("gate", "error point_pendulum Smooth/RK4/Direct 0.1\n");
   EXPECT_EQ(run_program(words, folder).exit_code, 0);
