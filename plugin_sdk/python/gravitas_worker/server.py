@@ -42,8 +42,8 @@ LOCAL_ADDRESS = re.compile(r"unix:.+|(127(\.\d{1,3}){3}|\[::1\]|localhost):\d{1,
 _Reason = control_pb2.Refusal
 
 # With --describe standard output is the declaration's alone: what a plugin prints, from here on or before and not yet
-# written, goes to standard error.
-_DESCRIBES = sys.argv[1:] == ["--describe"]
+# written, goes to standard error. It comes last, behind arguments of the plugin's own.
+_DESCRIBES = sys.argv[-1:] == ["--describe"]
 if _DESCRIBES:
     _declaration_file = os.dup(1)
     os.dup2(2, 1)
@@ -230,7 +230,7 @@ def _listen(plugin, address):
 def main(plugin):
     """The program of a worker with one plugin."""
     arguments = sys.argv[1:]
-    if _DESCRIBES:
+    if _DESCRIBES and len(arguments) == 1:
         _describe(plugin)
     elif len(arguments) == 2 and arguments[0] == "--listen":
         _listen(plugin, arguments[1])
