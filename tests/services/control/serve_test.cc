@@ -30,7 +30,10 @@ class Served {
   explicit Served(const std::vector<std::string>& options) {
     std::vector<std::string> words = {"serve", kSample, "--headless"};
     words.insert(words.end(), options.begin(), options.end());
+    // where a ctl of another test does not look for servers
+    setenv("XDG_RUNTIME_DIR", folder_.path("").c_str(), 1);
     process_ = harness::start_program(words, folder_);
+    unsetenv("XDG_RUNTIME_DIR");
     // it says so when it listens
     for (int i = 0; i < 3000 && said().empty() && kill(process_, 0) == 0; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
