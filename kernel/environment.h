@@ -237,6 +237,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool lets_go_of_limits();
   void note_what_joints_take();
   static std::string why_joints_took(double share, std::uint32_t step);
+  static std::string why_shortened(std::uint32_t times, std::uint32_t step);  // openings.cc
   // stops.cc: inner steps that end where stops are met.
   void meet_stops(double begin, double length);
   double next_stop(const Trusted<TrialState>& trial, double begin, double length, double* crossing);
@@ -398,9 +399,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::uint32_t times_finer_ = 1;                     // are the inner steps of this step
   std::pair<double, std::uint32_t> turned_far_;       // in the finest ones, since warnings() told of it
   std::pair<double, std::uint32_t> taken_by_joints_;  // share of velocities, and the step, since warnings() (Smooth)
-  bool ends_at_switch_ = false;                       // a force jumps at the end of what is being made
-  std::vector<std::uint32_t> broken_;                 // joints, under their load in the inner step that is being made
-  std::optional<Trusted<Pairs>> pairs_;               // the last
+  std::pair<std::uint32_t, std::uint32_t> refused_trials_;  // how many, and the first one's step, likewise
+  bool ends_at_switch_ = false;                             // a force jumps at the end of what is being made
+  std::vector<std::uint32_t> broken_;    // joints, under their load in the inner step that is being made
+  std::optional<Trusted<Pairs>> pairs_;  // the last
   Extrapolation extrapolation_, jumps_;
   static constexpr std::uint32_t kMostPieces = 8;                                     // of a part that is extrapolated
   std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities

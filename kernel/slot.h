@@ -124,8 +124,7 @@ class StageSlot {
   void set_rerun_every(std::uint32_t steps);
 
  private:
-  // The plugins of a slot live in one host, but for those that are commands, are at an address or may be followed by such;
-  // hosts may be shared.
+  // Plugins of a slot share a host, but for those that are commands, at an address, or may be followed by such.
   struct Route {
     std::size_t host;
     std::uint32_t target;

@@ -67,7 +67,7 @@ class SlotHost {
   void count_good_answer(Slot slot) { ++budget_of(slot).good_answers; }
 
   // After a failed call of the fault's slot: the next host is in place, for the same request again. Throws the last
-  // fault where the ladder ends. `poison` becomes true where the request itself is, or by its deadline may be, to blame for that.
+  // fault where the ladder ends. `poison` becomes true if the request is to blame, or hung as the last straw.
   Recovery recover(const StageFault& fault, Attempts* attempts, bool* poison);
 
   // A host for a swap, in preparation.

@@ -38,6 +38,7 @@ std::vector<std::string> Environment::warnings() {
   if (const auto [turn, body] = std::exchange(turned_far_, {}); turn > 0.0) lines.push_back(why_turned_far(turn, body));
   if (const auto [share, step] = std::exchange(taken_by_joints_, {}); share > 0.0)
     lines.push_back(why_joints_took(share, step));
+  if (const auto [n, step] = std::exchange(refused_trials_, {}); n > 0) lines.push_back(why_shortened(n, step));
   for (StageSlot* slot : slots_)
     for (const std::string& complaint : slot->take_complaints())
       lines.push_back(std::string("worker of slot ") + slot_name(slot->which()) + ": " + complaint);

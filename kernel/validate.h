@@ -1,9 +1,8 @@
 // Nothing a plugin answers is used before it has been checked: an answer arrives as Untrusted<StageCall>, and
 // only these functions make a Trusted<...> of it, which is what the next stage takes.
 //
-// Four layers: wire (the carrier's: sizes, epoch, digest), structure (rows, ids, order, uniqueness), numbers (finite,
-// unit, signs, bounds of friction), always; and in every so many steps physics (plugin_sdk/physics_checks.h). A violation
-// throws StageFault.
+// Four layers: wire (the carrier's), structure (rows, ids, order, uniqueness) and numbers (finite, unit, signs, bounds of
+// friction), always; every so many steps physics (plugin_sdk/physics_checks.h). A violation throws StageFault.
 #pragma once
 
 #include <cstdint>
@@ -59,8 +58,7 @@ struct Solution {};       // solved_*, pose_change, multipliers
 
 class Validator {
  public:
-  // Of an answer that the contract says, so that nobody was asked; and for a campaign's self-test: what a missing defence
-  // would say.
+  // Of an answer that the contract says, so that nobody was asked; and what a missing defence says (self-tests).
   template <typename Checked>
   static Checked unchecked() {
     return Checked({});

@@ -4,7 +4,10 @@
 //
 // One inner step more tells: what rests where the part ends, and does not then, may have begun before. It is as long as the others:
 // of what is redundant, a solver goes on with the solution that it has, and may find another for a step of another length.
+#include <algorithm>
+
 #include "kernel/environment.h"
+#include "kernel/simulators/location.h"
 #include "plugin_sdk/event_location.h"
 #include "plugin_sdk/solver.h"
 
@@ -25,6 +28,10 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
   const auto coefficient = [&](std::size_t i, MaterialColumn column) {
     return data_.contact_material[kMaterialColumns * i + column];
   };
+  // never below the dynamic one
+  const auto static_friction = [&](std::size_t i) {
+    return std::max(coefficient(i, kStaticFriction), coefficient(i, kDynamicFriction));
+  };
   const auto may_turn = [&](std::size_t i) {
     return coefficient(i, kRollingFriction) > 0.0 || coefficient(i, kSpinningFriction) > 0.0;
   };
@@ -32,7 +39,7 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
   for (std::size_t i = 0; i < data_.contact_key.size() && !any_bears; ++i) {
     const Vector3 impulse = vector_at(data_.contact_impulse.span(), i);
     const Vector3 across = impulse - pressed(i) * vector_at(data_.contact_normal.span(), i);
-    any_bears = across.norm() > kLoaded * coefficient(i, kStaticFriction) * pressed(i) ||
+    any_bears = across.norm() > kLoaded * static_friction(i) * pressed(i) ||
                 !vector_at(data_.contact_turning.span(), i).isZero(0.0);
   }
   if (!any_bears) return false;
@@ -41,7 +48,7 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
   if (lets_go()) return false;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     // what has given way bears next to nothing where dynamic friction is small
-    if (!(pressed(i) > 0.0) || !(coefficient(i, kStaticFriction) > 0.0 || may_turn(i))) continue;
+    if (!(pressed(i) > 0.0) || !(static_friction(i) > 0.0 || may_turn(i))) continue;
     const std::uint32_t* pair = &data_.contact_body[2 * i];
     const Vector3 point = vector_at(data_.contact_point.span(), i), normal = vector_at(data_.contact_normal.span(), i);
     const auto motion = [&](std::uint32_t body) {
@@ -50,18 +57,14 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
           pose_of(data_.trial_position, data_.trial_orientation, body),
           {vector_at(start_linear_velocity().span(), body), vector_at(start_angular_velocity().span(), body)}};
     };
-    const auto after = [&](std::uint32_t body) {
-      return Vector3(vector_at(data_.solved_linear_velocity.span(), body) +
-                     vector_at(data_.solved_angular_velocity.span(), body)
-                         .cross(point - vector_at(data_.trial_position.span(), body)));
-    };
     const auto turning = [&](const Column<double>& angular) {
       return (vector_at(angular.span(), pair[1]) - vector_at(angular.span(), pair[0])).norm();
     };
     const auto begins = [&](double before, double then) {
       return before <= kAtRest * accuracy && (then - before) * pieces > accuracy;
     };
-    const Vector3 apart = after(pair[1]) - after(pair[0]);
+    const Vector3 apart =
+        contact_velocity(data_, i, data_.trial_position, data_.solved_linear_velocity, data_.solved_angular_velocity);
     if (begins(start_slip(point, point, normal, motion(pair[0]), motion(pair[1])).norm(),
                (apart - normal.dot(apart) * normal).norm()) ||
         (may_turn(i) && begins(turning(start_angular_velocity()), turning(data_.solved_angular_velocity))))

@@ -19,13 +19,8 @@ constexpr double kLead = 0.9999;  // of the way to an impact is one step, the re
 double Environment::bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near) {
   const double nothing = kTargetShare * margin_;
   const auto start_speed = [&](std::size_t contact) {
-    const auto velocity = [&](std::uint32_t body) {
-      const Vector3 arm = vector_at(data_.contact_point.span(), contact) - vector_at(data_.trial_position.span(), body);
-      return Vector3(vector_at(start_linear_velocity().span(), body) +
-                     vector_at(start_angular_velocity().span(), body).cross(arm));
-    };
-    const std::uint32_t* pair = &data_.contact_body[2 * contact];
-    return vector_at(data_.contact_normal.span(), contact).dot(velocity(pair[1]) - velocity(pair[0]));
+    return vector_at(data_.contact_normal.span(), contact)
+        .dot(contact_velocity(data_, contact, data_.trial_position, start_linear_velocity(), start_angular_velocity()));
   };
   const auto find_contacts_at = [&](const Trusted<TrialState>& at) {
     look_up_contacts(find_contacts(bound_and_pair(at)));

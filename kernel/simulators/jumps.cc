@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "kernel/environment.h"
+#include "kernel/simulators/location.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -63,15 +64,11 @@ void Environment::find_changes(std::vector<double>* changes) {
 // Has the inner step that has been made left a pair apart that the attempts press together, and that starts at rest on each other
 // within the accuracy?
 bool Environment::lets_go() const {
-  const auto start_velocity = [&](std::size_t i, std::uint32_t body) {
-    const Vector3 arm = vector_at(data_.contact_point.span(), i) - vector_at(data_.trial_position.span(), body);
-    return Vector3(vector_at(start_linear_velocity().span(), body) +
-                   vector_at(start_angular_velocity().span(), body).cross(arm));
-  };
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     const std::array pair = {data_.contact_body[2 * i], data_.contact_body[2 * i + 1]};
     if (std::ranges::binary_search(pressed_, pair) || !std::ranges::binary_search(pressed_by_attempts_, pair)) continue;
-    const Vector3 start = start_velocity(i, pair[1]) - start_velocity(i, pair[0]);
+    const Vector3 start =
+        contact_velocity(data_, i, data_.trial_position, start_linear_velocity(), start_angular_velocity());
     if (gap_at(i, states_[back_]) <= description_.accuracy &&
         std::fabs(vector_at(data_.contact_normal.span(), i).dot(start)) <= description_.accuracy)
       return true;

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "kernel/environment.h"
+#include "kernel/simulators/location.h"
 #include "plugin_sdk/discrepancy.h"
 
 namespace gravitas::kernel {
@@ -73,16 +74,11 @@ void Environment::open_parting_contacts() {
   const double accuracy = description_.accuracy, step = length_of_step(step_count_ + 1);
   if (!(accuracy > 0.0) || data_.time_step[0] > std::max(kNextToNothing * step, kBeyond * kNear * accuracy)) return;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
-    const Vector3 point = vector_at(data_.contact_point.span(), i);
-    const auto velocity = [&](std::uint32_t body) {
-      return Vector3(
-          vector_at(start_linear_velocity().span(), body) +
-          vector_at(start_angular_velocity().span(), body).cross(point - vector_at(front().position.span(), body)));
-    };
-    const Vector3 parting = velocity(data_.contact_body[2 * i + 1]) - velocity(data_.contact_body[2 * i]);
-    if (vector_at(data_.contact_normal.span(), i).dot(parting) > std::max(kSlow * accuracy, kRolling))
-      data_.contact_depth[i] = -data_.margin[0],
-      set_vector(data_.contact_warm_impulse.span(), static_cast<std::uint32_t>(i), Vector3::Zero());
+    const Vector3 parting =
+        contact_velocity(data_, i, front().position, start_linear_velocity(), start_angular_velocity());
+    if (vector_at(data_.contact_normal.span(), i).dot(parting) <= std::max(kSlow * accuracy, kRolling)) continue;
+    data_.contact_depth[i] = -data_.margin[0];
+    set_vector(data_.contact_warm_impulse.span(), static_cast<std::uint32_t>(i), Vector3::Zero());
   }
 }
 

@@ -99,12 +99,8 @@ double Environment::bounce_speed(std::span<const std::uint32_t> pair) const {
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     if (!std::ranges::equal(data_.contact_body.span().subspan(2 * i, 2), pair)) continue;
     if (vector_at(data_.contact_impulse.span(), i).isZero(0.0)) continue;
-    const auto velocity = [&](std::uint32_t body) {
-      const Vector3 arm = vector_at(data_.contact_point.span(), i) - vector_at(front().position.span(), body);
-      return Vector3(vector_at(front().linear_velocity.span(), body) +
-                     vector_at(front().angular_velocity.span(), body).cross(arm));
-    };
-    const Vector3 parting = velocity(pair[1]) - velocity(pair[0]);
+    const Vector3 parting =
+        contact_velocity(data_, i, front().position, front().linear_velocity, front().angular_velocity);
     fastest = std::max(fastest, vector_at(data_.contact_normal.span(), i).dot(parting));
   }
   return fastest;

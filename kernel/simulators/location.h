@@ -1,10 +1,11 @@
-// What the searches for impacts share (located.cc, halving.cc), and who keeps the pairs that touch (gaps.cc).
+// What the searches for impacts and jumps share (located.cc, halving.cc, jumps.cc, breakaways.cc, limits.cc), and who keeps the pairs that touch (gaps.cc).
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 #include <span>
 
+#include "kernel/step_data.h"
 #include "plugin_sdk/local_bound.h"
 
 namespace gravitas::kernel {
@@ -16,6 +17,16 @@ inline constexpr double kFinest = 1e-13;      // of the step: its shortest part
 inline bool starts_with(std::span<const std::uint32_t> pair, std::span<const std::uint32_t>* pairs) {
   while (!pairs->empty() && std::ranges::lexicographical_compare(pairs->first(2), pair)) *pairs = pairs->subspan(2);
   return !pairs->empty() && std::ranges::equal(pairs->first(2), pair);
+}
+
+// Velocity (m/s) of body 2 of a contact relative to body 1 at its point, seen with the places of `position`.
+inline Vector3 contact_velocity(const StepData& data, std::size_t contact, const Column<double>& position,
+                                const Column<double>& linear, const Column<double>& angular) {
+  const auto velocity = [&](std::uint32_t body) {
+    const Vector3 arm = vector_at(data.contact_point.span(), contact) - vector_at(position.span(), body);
+    return Vector3(vector_at(linear.span(), body) + vector_at(angular.span(), body).cross(arm));
+  };
+  return velocity(data.contact_body[2 * contact + 1]) - velocity(data.contact_body[2 * contact]);
 }
 
 // turns.cc: what two bodies overlap by no more than this is pushed out on the side where it came in, m.

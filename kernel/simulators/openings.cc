@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -39,7 +40,13 @@ Trusted<TrialState> Environment::integrate_shorter(double begin, double* length)
     } catch (const StageFault& fault) {
       if (halvings == kMostHalvings || fault.kind != FaultKind::kRefusal || fault.slot != Slot::kIntegrator) throw;
     }
+    if (refused_trials_.first++ == 0) refused_trials_.second = step_count_ + 1;
   }
+}
+
+std::string Environment::why_shortened(std::uint32_t times, std::uint32_t step) {
+  return "from step " + std::to_string(step) + " on the integrator refused trials of whole steps (" +
+         std::to_string(times) + " in all), which were made in shorter ones";
 }
 
 // Where stops are pressed again in S*: how long an inner step is that ends while they are open. In end_stops_ are the stops where it

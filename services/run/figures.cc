@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plugin_sdk/counted.h"
 #include "plugin_sdk/dynamics.h"
@@ -21,9 +22,11 @@ constexpr double kOverlap = 0.02;
 // Ways of a step, of what the scene measures: nobody means that.
 constexpr double kRunaway = 1e6;
 
-template <typename Numbers>
-void write_vector(const Vector3& vector, Numbers* numbers) {
-  numbers->Add(vector.begin(), vector.end());
+void write_change(const Vector3& initial, const Vector3& final_value, report::v1::VectorChange* change) {
+  for (int k = 0; k < 3; ++k) {
+    change->add_initial(initial[k]);
+    change->add_final(final_value[k]);
+  }
 }
 
 // Numbers of a property among the flattened ones, or nothing if the type has no such property.
@@ -218,17 +221,15 @@ void Figures::begin_again(kernel::Environment* environment) {
 
 void Figures::write(report::v1::Report* report) const {
   const double scale = std::max(std::fabs(reference_energy_), largest_kinetic_);
-  if (initial_) {
-    report->mutable_energy()->set_initial(initial_->energy());
-    report->mutable_energy()->set_max_relative_drift(scale > 0.0 ? largest_deviation_ / scale : 0.0);
-    write_vector(initial_->linear, report->mutable_linear_momentum()->mutable_initial());
-    write_vector(initial_->angular, report->mutable_angular_momentum()->mutable_initial());
-  }
-  if (last_) {
-    report->mutable_energy()->set_final(last_->energy());
-    write_vector(last_->linear, report->mutable_linear_momentum()->mutable_final());
-    write_vector(last_->angular, report->mutable_angular_momentum()->mutable_final());
-  }
+  Totals unknown;
+  unknown.potential = std::numeric_limits<double>::quiet_NaN();
+  unknown.linear = unknown.angular = Vector3::Constant(unknown.potential);
+  const Totals initial = initial_.value_or(unknown), last = last_.value_or(unknown);
+  report->mutable_energy()->set_initial(initial.energy());
+  report->mutable_energy()->set_final(last.energy());
+  report->mutable_energy()->set_max_relative_drift(scale > 0.0 ? largest_deviation_ / scale : 0.0);
+  write_change(initial.linear, last.linear, report->mutable_linear_momentum());
+  write_change(initial.angular, last.angular, report->mutable_angular_momentum());
   report->set_max_penetration(penetration_);
   report->set_max_joint_error(joint_error_);
   const auto overflows = [](const std::optional<Totals>& one) { return one && !std::isfinite(one->energy()); };

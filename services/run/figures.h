@@ -16,7 +16,7 @@ class Figures {
   explicit Figures(const kernel::EnvironmentDescription& description);
 
   // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential); then
-  // no energy is written for that state.
+  // its energy and momenta are written as NaN.
   void follow(kernel::Environment* environment);
   // Called for every inner step.
   void look_at(const kernel::InnerStep& inner);

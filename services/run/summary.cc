@@ -108,12 +108,11 @@ std::string summarize(const report::v1::Report& report, const std::vector<EventL
                                  report.microseconds_per_step().median());
   const std::string happened = story(report, meetings);
   if (!happened.empty()) text += "  " + happened + "\n";
-  const auto energy = [](bool is_known, double number) {
-    return !is_known ? "not known" : std::isfinite(number) ? fmt::format("{:.6g}", number) : "not finite";
+  const auto energy = [](double number) {
+    return std::isnan(number) ? "not known" : std::isinf(number) ? "not finite" : fmt::format("{:.6g}", number);
   };
   text += fmt::format("  energy {} -> {} J, contacts up to {:.2g} m deep, joint error <= {:.2g} m\n",
-                      energy(report.has_energy(), report.energy().initial()),
-                      energy(report.energy().has_final(), report.energy().final()), report.max_penetration(),
+                      energy(report.energy().initial()), energy(report.energy().final()), report.max_penetration(),
                       report.max_joint_error());
   text += exchanges(report);
   text += fmt::format("  {}\n  chain hash {}\n", hosts(report.plan()), report.chain_hash());

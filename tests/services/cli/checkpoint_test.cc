@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -96,7 +97,7 @@ TEST(Checkpoints, AForceThatFailsWhereARunGoesOnIsToldAsThat) {
     EXPECT_THAT(result.out, HasSubstr("-> not known J"));
     const report::v1::Energy energy = read_report(read_file(report)).energy();
     EXPECT_DOUBLE_EQ(energy.initial(), 0.5 * 0.1 * 0.1);
-    EXPECT_FALSE(energy.has_final());
+    EXPECT_TRUE(std::isnan(energy.final()));
   };
   paused({});
   paused({"--resume", kept});
