@@ -30,11 +30,11 @@
 // taut is a rod, and a bounded drive that is not overloaded one without bound (reaction_holdings.cc). A limit is a row where
 // it was closed in S_n (1e-8 of the reach, or rad) and not opening, a drive or friction where it was at its velocity there.
 // Multipliers that a row cannot have let it go: a limit is open then, a drive pushes with its bound; what closes without is held
-// again, twice at most. A drive that was not at its velocity in S_n pushes towards it, with its bound, and beyond; one that would go
-// beyond it by three times what it was short of is left to the step's end. A limit that opens in S_n, or that is open by more than 3/4 of the square of what
-// turns in the step, by which states that an integrator tries may be off, is let go: pushed on where it goes, it would be given energy.
-// So the integrator's order is that of motion while none of this changes; where it does, a step is of first order, unless it ends there
-// (stop_location.h: limits that close, drives that come to their velocity). At the
+// again, twice at most. A drive that was not at its velocity in S_n pushes towards it, with its bound, and beyond; one that would
+// go beyond it by three times what it was short of is left to the step's end. A limit that opens in S_n, or that is open by more
+// than 3/4 of the square of what turns in the step, by which states that an integrator tries may be off, is let go: pushed on
+// where it goes, it would be given energy. So the integrator's order is that of motion while none of this changes; where it does,
+// a step is of first order, unless it ends there (stop_location.h: limits that close, drives that come to their velocity). At the
 // step's end a limit that bore something is closed like a lock, and a drive that did all it can is left alone, unless it went
 // beyond its velocity.
 //

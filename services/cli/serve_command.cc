@@ -88,7 +88,7 @@ int serve(ServeLine* line) {
   try {
     saved = run.save_checkpoint();
   } catch (const std::system_error&) {
-    // what a fault says of it
+    // the fault has told why
     if (run.status().state() != "faulted") throw;
   }
   const control_api::v1::Status status = run.status();

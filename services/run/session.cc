@@ -86,7 +86,7 @@ class Run final : private kernel::CommitListener {
     if (!options_.instrumentation.empty() || !options_.joints.empty()) survey_.emplace(answering.now, options_.starter);
     if (options_.listener) begin_listening();
     figures_ = std::make_unique<Figures>(description_);
-    // a decision of the start is one of the step after the state that is restored
+    // decisions of the start are told after a restore, as of the step that follows it
     if (!resumed) attend();
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed, answering.now);
