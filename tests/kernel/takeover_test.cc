@@ -369,7 +369,7 @@ TEST_F(TakeOver, RerunsEndWhereNoOtherProcessCanBeHad) {
   run_to_end(&world);
   EXPECT_LE(starts(), begun + 2);
   EXPECT_THAT(
-      world.warnings(),
+      warnings_but_of_slow_calls(&world),
       ElementsAre(
           "worker of slot solver: no other process for a re-run, and none is looked for any more: it does not start"));
 }

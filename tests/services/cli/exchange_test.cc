@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -76,7 +77,9 @@ TEST(Exchange, LinesOfAFloodAreOneWarningWithTheirCount) {
   const Outcome run = run_sample({"--fault", "solver:flood,bytes=1e6@step=5"});
   ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
   EXPECT_EQ(run.report.chain_hash(), quiet_chain());
-  EXPECT_LT(run.report.warnings_size(), 5);
+  // beside those of slow calls, which a busy machine makes of any
+  const auto is_no_slow_call = [](const std::string& one) { return one.find(": it was slow ") == std::string::npos; };
+  EXPECT_LT(std::ranges::count_if(run.report.warnings(), is_no_slow_call), 5);
   EXPECT_THAT(run.report.warnings(),
               Contains(ContainsRegex("^worker of slot solver: stdout: \\.{79} \\([0-9]+ times\\)$")));
   EXPECT_THAT(run.report.warnings(), Contains(HasSubstr(" more bytes dropped")));
