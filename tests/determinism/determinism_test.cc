@@ -63,6 +63,9 @@ std::optional<std::uint32_t> most_steps(const std::string& scene) {
   return std::nullopt;
 }
 
+// In workers the start of every scene: a step there costs up to a hundred in process.
+std::uint32_t steps_in_workers(const std::string& scene) { return most_steps(scene).value_or(200); }
+
 Hashes hashes_of(const std::string& scene, std::vector<HostingChoice> hosting, std::uint32_t threads = 1,
                  std::vector<std::string> overrides = {}, std::optional<std::uint32_t> steps = std::nullopt) {
   RunOptions options;
@@ -84,31 +87,43 @@ const std::vector<HostingChoice> kAllMessages = {{std::nullopt, Hosting::kGrpc}}
 class SameBits : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(SameBits, InProcessAndInWorkersWithOneThreadOrTwoAndAgain) {
-  const auto on = [](const std::vector<HostingChoice>& hosting, std::uint32_t threads) {
-    return hashes_of(GetParam(), hosting, threads, {}, most_steps(GetParam()));
-  };
-  const Hashes reference = on(kAllDirect, 1);
-  EXPECT_EQ(on(kAllDirect, 1), reference) << "repeated";
-  EXPECT_EQ(on(kAllDirect, 2), reference) << "two threads";
-  EXPECT_EQ(on(kAllWorkers, 1), reference) << "in workers";
-  EXPECT_EQ(on(kAllWorkers, 2), reference) << "in workers with two threads";
-  EXPECT_EQ(on(kAllMessages, 1), reference) << "in workers by gRPC";
+  const std::string scene = GetParam();
+  const std::optional<std::uint32_t> whole = most_steps(scene);
+  const Hashes reference = hashes_of(scene, kAllDirect, 1, {}, whole);
+  EXPECT_EQ(hashes_of(scene, kAllDirect, 1, {}, whole), reference) << "repeated";
+  EXPECT_EQ(hashes_of(scene, kAllDirect, 2, {}, whole), reference) << "two threads";
+
+  const std::uint32_t steps = steps_in_workers(scene);
+  const Hashes start = hashes_of(scene, kAllDirect, 1, {}, steps);
+  EXPECT_EQ(hashes_of(scene, kAllWorkers, 1, {}, steps), start) << "in workers";
+  EXPECT_EQ(hashes_of(scene, kAllWorkers, 2, {}, steps), start) << "in workers with two threads";
+  EXPECT_EQ(hashes_of(scene, kAllMessages, 1, {}, steps), start) << "in workers by gRPC";
 }
 
+// Each slot in one of three ways, another one in the next scene: a run in workers costs more to start than to step.
 TEST_P(SameBits, WithOneSlotElsewhereThanTheOthers) {
   const std::string scene = GetParam();
   const std::uint32_t steps = most_steps(scene).value_or(30);
   const Hashes reference = hashes_of(scene, kAllDirect, 1, {}, steps);
+  const std::vector<std::string> scenes = all_scenes();
+  std::size_t way = static_cast<std::size_t>(std::ranges::find(scenes, scene) - scenes.begin());
   for (const Slot slot : kSlots) {
-    EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kDirect}, {slot, Hosting::kSharedMemory}}, 1, {}, steps),
-              reference)
-        << slot_name(slot) << " alone in a worker";
-    EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kSharedMemory}, {slot, Hosting::kDirect}}, 3, {}, steps),
-              reference)
-        << slot_name(slot) << " alone in process";
-    EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kSharedMemory}, {slot, Hosting::kGrpc}}, 2, {}, steps),
-              reference)
-        << slot_name(slot) << " alone by gRPC";
+    switch (way++ % 3) {
+      case 0:
+        EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kDirect}, {slot, Hosting::kSharedMemory}}, 1, {}, steps),
+                  reference)
+            << slot_name(slot) << " alone in a worker";
+        break;
+      case 1:
+        EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kSharedMemory}, {slot, Hosting::kDirect}}, 3, {}, steps),
+                  reference)
+            << slot_name(slot) << " alone in process";
+        break;
+      default:
+        EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kSharedMemory}, {slot, Hosting::kGrpc}}, 2, {}, steps),
+                  reference)
+            << slot_name(slot) << " alone by gRPC";
+    }
   }
 }
 

@@ -112,9 +112,9 @@ TEST_P(RealFaults, AreSurvivedBitForBit) {
 
 TEST(SimulatedFaults, AreSurvivedBitForBit) {
   const ScratchFolder folder;
-  const Outcome outcome = campaign_of({"--tier", "simulated", "--faults", "20000", "--seed", "2026"}, folder);
+  const Outcome outcome = campaign_of({"--tier", "simulated", "--faults", "12000", "--seed", "2026"}, folder);
   EXPECT_EQ(outcome.program.exit_code, 0) << outcome.program.err << failures(outcome.table);
-  EXPECT_GE(outcome.table.injected(), 20000U);
+  EXPECT_GE(outcome.table.injected(), 12000U);
   EXPECT_EQ(outcome.table.forbidden(), 0U);
   EXPECT_LT(outcome.table.forbidden_bound(), 3e-4);
   for (const char* group : {"process", "hang", "wire", "values", "malformed", "re-run", "start", "poison", "swap"}) {

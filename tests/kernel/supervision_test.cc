@@ -16,6 +16,7 @@
 #include "kernel/slot_host.h"
 #include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
+#include "tests/sanitized.h"
 
 namespace gravitas {
 namespace {
@@ -76,7 +77,7 @@ TEST_P(Supervised, WithoutAStandbyANewWorkerIsStarted) {
 
 // How a worker ended is told only to who asks, and kept until then.
 TEST_P(Supervised, DeathsThatNobodyAsksAboutHoldNoDescriptor) {
-  constexpr std::uint32_t kDeaths = 12, kBetween = kernel::SlotHost::kGoodAnswers + 1;
+  constexpr std::uint32_t kDeaths = harness::unless_sanitized(12, 3), kBetween = kernel::SlotHost::kGoodAnswers + 1;
   WorldBuilder cold = busy_world(GetParam()).steps((kDeaths + 1) * kBetween, 1e-4);
   cold.description().solver.standbys = 0;
   Environment world(cold.description());

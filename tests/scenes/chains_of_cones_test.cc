@@ -146,22 +146,23 @@ TEST(ChainOfCones, GainsNoEnergyWithSmooth) {
     const char* cone;
     double speed;
     Vector3 moments;
+    std::string solver;
   };
   const Vector3 rod(8e-5, 7.5e-4, 7.5e-4), ball = Vector3::Constant(7e-4);
-  for (const Chain& chain : {Chain{4, "ReachConeAngle = 0.2", 7.0, ball}, Chain{6, "ReachConeAngle = 0.1", 5.0, rod},
-                             Chain{6, "ReachConeAngle = 0.1", 7.0, rod}, Chain{8, "ReachConeAngle = 0.2", 5.0, rod}})
-    for (const std::string solver : {"Newton", "Direct"}) {
-      SceneRun run(whip(chain.links, chain.cone, chain.speed, chain.moments),
-                   {set("Simulator", "Smooth"), set("Simulator.TimeStep", 1.0 / 240.0), set("Solver", solver)});
-      const double start = run.energy();
-      double before = start;
-      while (run.time() < 0.25) {
-        run.step();
-        EXPECT_LE(run.energy(), before + 1e-6 * start) << chain.links << ' ' << solver << ' ' << run.time();
-        before = run.energy();
-      }
-      EXPECT_LE(run.report().max_joint_error(), 1e-5) << chain.links << ' ' << solver;
+  for (const Chain& chain :
+       {Chain{4, "ReachConeAngle = 0.2", 7.0, ball, "Newton"}, Chain{6, "ReachConeAngle = 0.1", 5.0, rod, "Direct"},
+        Chain{6, "ReachConeAngle = 0.1", 7.0, rod, "Newton"}, Chain{8, "ReachConeAngle = 0.2", 5.0, rod, "Direct"}}) {
+    SceneRun run(whip(chain.links, chain.cone, chain.speed, chain.moments),
+                 {set("Simulator", "Smooth"), set("Simulator.TimeStep", 1.0 / 240.0), set("Solver", chain.solver)});
+    const double start = run.energy();
+    double before = start;
+    while (run.time() < 0.15) {
+      run.step();
+      EXPECT_LE(run.energy(), before + 1e-6 * start) << chain.links << ' ' << chain.solver << ' ' << run.time();
+      before = run.energy();
     }
+    EXPECT_LE(run.report().max_joint_error(), 1e-5) << chain.links << ' ' << chain.solver;
+  }
 }
 
 // The trial of the whole step ran away to a thousand times the speeds, where no Accuracy can be met: the run paused in its first

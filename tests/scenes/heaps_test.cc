@@ -149,16 +149,16 @@ TEST(Heaps, OfOnePlacePart) {
 
 // Cubes that lie on each other crosswise touch in all of their common face, else they rock from edge to edge for ever: there
 // were 15 to 60 mm of overlap, and 0.5 m/s.
-// A heap is chaos, and in one of five a cube still tips: the median of five.
+// A heap is chaos, and in one of five a cube still tips: the median of three.
 TEST(Heaps, OfCubesComeToRest) {
   std::vector<double> deepest, fastest;
-  for (std::uint64_t seed = 64; seed < 69; ++seed) {
+  for (std::uint64_t seed = 64; seed < 67; ++seed) {
     const Rest rest = rest_of_cubes(seed);
     deepest.push_back(rest.deepest), fastest.push_back(rest.fastest);
   }
   std::ranges::sort(deepest), std::ranges::sort(fastest);
-  EXPECT_LT(deepest[2], 1e-3);
-  EXPECT_LT(fastest[2], 0.1);
+  EXPECT_LT(deepest[1], 1e-3);
+  EXPECT_LT(fastest[1], 0.1);
 }
 
 }  // namespace

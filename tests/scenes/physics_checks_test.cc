@@ -14,7 +14,7 @@ namespace gravitas {
 namespace {
 
 // Steps of one run: of the large scenes the fall and the first heap.
-constexpr std::uint32_t kMostSteps = 200, kMostStepsOfLarge = 30;
+constexpr std::uint32_t kMostSteps = 120, kMostStepsOfLarge = 20;
 
 std::vector<std::string> scenes() {
   std::vector<std::string> paths;

@@ -286,7 +286,7 @@ TEST_P(StopBounces, ComeToRest) {
 
 // Of a chain of hinges and ball joints with stops, flung about without loads, energy never rises.
 TEST_P(StopBounces, NeverAddEnergyToChains) {
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     conformance::Draw draw(seed);
     std::string bodies, joints;
     const std::uint32_t count = 2 + draw.below(3);

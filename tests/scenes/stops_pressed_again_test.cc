@@ -70,7 +70,7 @@ INSTANTIATE_TEST_SUITE_P(By, PressedAgain,
 TEST_P(PressedAgain, StopsAndRopesGiveNoEnergy) {
   for (const Fall& fall : {Fall{.stiffness = 1e5}, Fall{.light = 1.0}, Fall{.is_rope = true, .stiffness = 1e5},
                            Fall{.is_force = true, .stiffness = 1e5}}) {
-    SceneRun run(scene_of(fall), {std::string("Integrator=") + GetParam(), set("Simulator.Duration", 0.6)});
+    SceneRun run(scene_of(fall), {std::string("Integrator=") + GetParam(), set("Simulator.Duration", 0.4)});
     const double start = energy_of(run, fall);
     double before = start, least = 0.0;
     while (!run.is_done()) {

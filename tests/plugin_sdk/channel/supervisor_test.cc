@@ -107,10 +107,10 @@ TEST(Supervisor, AllOutputIsReadBeforeTheListenerHearsOfTheEnd) {
   }
 }
 
-// 1 GB without a line end, and as much in lines: it must neither wait for us nor be kept.
+// 300 MB without a line end, and as much in lines: it must neither wait for us nor be kept.
 TEST(Supervisor, AFloodIsReadAndCountedAndNotKept) {
-  constexpr std::uint64_t kFlood = 1'000'000'000;
-  for (const std::string command : {"head -c 1000000000 /dev/zero", "yes 0123456789 | head -c 1000000000"}) {
+  constexpr std::uint64_t kFlood = 300'000'000;
+  for (const std::string command : {"head -c 300000000 /dev/zero", "yes 0123456789 | head -c 300000000"}) {
     const auto process = shell(command + "; echo survived >&2");
     wait_for_end(*process);
     EXPECT_EQ(process->ending(), "ended by itself with exit code 0");

@@ -38,7 +38,7 @@ TEST(Penetration, IsTheLeastOverAllDirections) {
   test::RandomShapes random(31);
   for (const SceneShape::Kind kind_a : test::kConvexKinds) {
     for (const SceneShape::Kind kind_b : test::kConvexKinds) {
-      for (int i = 0; i < harness::unless_sanitized(30); ++i) {
+      for (int i = 0; i < harness::unless_sanitized(15); ++i) {
         const SceneShape a = random.convex(kind_a), b = random.convex(kind_b);
         const auto map_a = make_support_map(a), map_b = make_support_map(b);
         const PlacedPair pair{*map_a, *map_b, random.rotation().toRotationMatrix(),
@@ -63,7 +63,7 @@ TEST(Penetration, OfPolyhedraIsExact) {
   test::RandomShapes random(32);
   for (const SceneShape::Kind kind_b : {SceneShape::Kind::kSphere, SceneShape::Kind::kBox, SceneShape::Kind::kCapsule,
                                         SceneShape::Kind::kConvexPolyhedron}) {
-    for (int i = 0; i < harness::unless_sanitized(200); ++i) {
+    for (int i = 0; i < harness::unless_sanitized(80); ++i) {
       const SceneShape a = random.convex(SceneShape::Kind::kConvexPolyhedron), b = random.convex(kind_b);
       const auto map_a = make_support_map(a), map_b = make_support_map(b);
       const PlacedPair pair{*map_a, *map_b, random.rotation().toRotationMatrix(),
