@@ -92,7 +92,8 @@ bool ReactionSolver::is_closed_limit(const Joint& joint, std::size_t axis) {
   return holding.holds && !holding.is_velocity && !holds_always(joint.discrepancy, static_cast<int>(axis));
 }
 
-// Without memory of the states before, each finds it anew.
+// Without memory of the states before, each finds it anew. What ropes that roll off drums bear there is off by what they rolled:
+// whether they bear is for the state itself to say.
 void ReactionSolver::let_go_from_start() {
   const auto has_closed = [](const Joint& joint) {
     return is_closed_limit(joint, 0) || is_closed_limit(joint, 1) || is_closed_limit(joint, 2);
@@ -110,7 +111,8 @@ void ReactionSolver::let_go_from_start() {
     Joint& joint = joints_[i];
     std::swap(joint.holdings, closed[i]);
     for (std::size_t axis = 0; axis < 3; ++axis)
-      if (is_closed_limit(joint, axis) && !closed[i][axis].holds) joint.holdings[axis] = Holding{};
+      if (is_closed_limit(joint, axis) && !closed[i][axis].holds && !joint.discrepancy.is_rolling())
+        joint.holdings[axis] = Holding{};
   }
 }
 
@@ -152,6 +154,15 @@ double ReactionSolver::strayed(const Row& row) const {
   return kOfSquare * turn * turn * row.reach + kRoundingOfRest * (row.reach + coordinates);
 }
 
+double ReactionSolver::rolled(const Joint& joint, const Discrepancy& at_start) const {
+  if (!at_start.is_rolling()) return 0.0;
+  const auto direction = [](const Discrepancy& d, const Quaternion& attitude) {
+    return Vector3((attitude.conjugate() * (d.point2 - d.point1)).normalized());
+  };
+  const Body& drum = bodies_[joint.body1];
+  return (direction(joint.discrepancy, drum.asked.orientation) - direction(at_start, drum.pose.orientation)).norm();
+}
+
 void ReactionSolver::turn_to_limit(Joint* joint) {
   const Discrepancy start = at_pose(*joint);
   const Twisting twisting = twisting_of(start);
@@ -163,11 +174,13 @@ void ReactionSolver::turn_to_limit(Joint* joint) {
 
 ReactionSolver::Holding ReactionSolver::holding_at_start(const Joint& joint, const Discrepancy& d, int axis,
                                                          const Row& row) const {
-  constexpr double kOfChange = 2.0;  // of what it is asked for changes by in a step
+  constexpr double kOfChange = 2.0;                   // of what it is asked for changes by in a step
+  constexpr double kOfCube = 0.25, kOfSquare = 0.75;  // of what a rope rolled; the first terms are a sixth and a half
   const Body &one = bodies_[row.body1], &two = bodies_[row.body2];
   const Vector3 along = d.is_angular() ? Vector3(to_rotation_matrix(d.axes).col(axis)) : row.direction.linear;
   const double rate = row.direction.along(one.velocity, two.velocity) - along.dot(d.velocity);
-  const double still = still_rate(row.direction.size_along(one.velocity, two.velocity));
+  const double speed = row.direction.size_along(one.velocity, two.velocity), roll = rolled(joint, d);
+  const double still = still_rate(speed) + kOfSquare * roll * roll * speed;
   Holding holding;
   if (is_drive(axis_mode(d.modes, axis))) {
     const double bound = d.maximum_force[axis];
@@ -180,7 +193,7 @@ ReactionSolver::Holding ReactionSolver::holding_at_start(const Joint& joint, con
     if (!holding.holds) holding.push = std::copysign(bound, -slip), holding.missing = std::abs(slip);
     return holding;
   }
-  const double slop = kAtLimit * (d.is_angular() ? 1.0 : row.reach);
+  const double slop = (kAtLimit + kOfCube * roll * roll * roll) * (d.is_angular() ? 1.0 : row.reach);
   if (row.error <= lower_limit(d, axis) + slop && rate <= still) {
     holding.holds = true;
     if (axis_mode(d.modes, axis) != AxisMode::kUnilateral) holding.limit = &Discrepancy::lower;

@@ -145,6 +145,8 @@ class ReactionSolver {
   // By how much the row may be off in a state that an integrator tries: the second order of what turns in the step, and
   // rounding; m or rad.
   double strayed(const Row& row) const;
+  // By how much the leaving point of a rope went round a drum since S_n, where the bodies are, rad; 0 of what does not roll.
+  double rolled(const Joint& joint, const Discrepancy& at_start) const;
   static Holding held_always(const Discrepancy& d, int axis);
   Holding holding_at_start(const Joint& joint, const Discrepancy& d, int axis, const Row& row) const;
   // What a drive across two directions (joint_rows.h) turns at in S_n, where the bodies are, rad/s.

@@ -21,9 +21,9 @@
 // across k and R = |P - c| there,
 //   grad e = u - (1 - l/L) R/l (R)^ + z/L k,   which has the torque r about k, and is u in the plane of the drum.
 // There it has e to the second order, too: the row is radial (discrepancy.h), about a point at the distance L behind P, where rope
-// and involute have their centre. `Smooth` carries rows from its stages to where the step began, off by a third order of its turns:
-// ropes that may be slack seem so there, and are held by the end of the step. Those that are Taut hold throughout. Where
-// ropes slant all this is so to the second order of the slant; the groove bears the rest.
+// and involute have their centre. `Smooth` carries rows from its stages to where the step began, off by a third order of its turns,
+// which it knows of them (kRollingDiscrepancy). Where ropes slant all this is so to the second order of the slant; the groove bears
+// the rest.
 // With a stiffness it is a spring and a damper, as a `Distance`.
 //
 // Where P comes into the drum (R < r) all is wound up, L = 0, and the rope pulls about the axis, along n x k with n towards P; on the
@@ -135,7 +135,7 @@ class Winch final : public ConstraintPlugin {
                               .velocity(bodies.velocity1, bodies.spin1, bodies.velocity2, bodies.spin2);
       const double error = in_its_turn(rope.length - paid_out - radius * math::atan2(seen.z(), seen.y()), made,
                                        kWholeTurn * radius, is_symmetric);
-      if (rope.is_free) d.modes |= kRadialDiscrepancy;
+      if (rope.is_free) d.modes |= kRadialDiscrepancy | kRollingDiscrepancy;
       d.upper.x() = rope.length - error / steepness;
       d.lower.x() = is_taut ? d.upper.x() : -kUnlimited;
       if (spring.stiffness > 0.0) d.compliance.x() = 1.0 / (spring.stiffness * steepness * steepness);
@@ -165,14 +165,14 @@ class Winch final : public ConstraintPlugin {
             whole, true};
   }
 
-  // Of error + k period what the step made: see the head. What is off a rigid rope by more than rounding, and shortens as only
-  // what is slack would, comes from behind.
+  // Of error + k period what the step made: see the head. What is off a rigid rope by more than an integrator leaves of
+  // it in a trial, and shortens as only what is slack would, comes from behind.
   static double in_its_turn(double error, double made, double period, bool is_symmetric) {
     constexpr double kTooLong = 0.1, kStretched = 0.5;  // turns
-    constexpr double kRests = 1e-9, kMoves = 1e-2;      // turns; of how far it is off
+    constexpr double kOff = 1e-3, kMoves = 1e-2;        // turns; of how far it is off
     const double middle = ((is_symmetric ? kStretched : kTooLong) - 0.5) * period;
     const double begun = error - made, known = begun - period * std::round((begun - middle) / period);
-    const bool comes_from_behind = !is_symmetric && known > kRests * period && -made > kMoves * known && -made < known;
+    const bool comes_from_behind = !is_symmetric && known > kOff * period && -made > kMoves * known && -made < known;
     return known + made - (comes_from_behind ? period : 0.0);
   }
 };
