@@ -43,6 +43,7 @@ StepOutcome Environment::step() {
       throw;
     } catch (const StageFault& fault) {
       fault_ = FaultRecord{step_count_ + 1, fault};
+      std::erase_if(budgets_, [&](const SavedBudget& one) { return one.slot == fault.slot; });
     }
     return StepOutcome::kPaused;
   }
@@ -136,6 +137,10 @@ void Environment::finish_step() {
   // what takes memory may fail: only now the state is S_{n+1}
   ++step_count_;
   wake_orders_.clear();
+  budgets_.clear();
+  for (StageSlot* slot : slots_)
+    for (std::uint32_t row = 0; const Budget* budget = slot->budget_of(row); ++row)
+      if (budget->failures > 0) budgets_.push_back({slot->which(), row, *budget});
   lap_ns_ = lap_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_between(start, lap_ns_));
 }

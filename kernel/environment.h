@@ -437,6 +437,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::vector<std::size_t> next_in_group_;                                          // scratch of merge_discrepancies()
 
   CommitFigures figures_;
+  std::vector<SavedBudget> budgets_;
   Hash state_hash_, chain_hash_;
   std::optional<FaultRecord> fault_;
   std::vector<FaultRecord> faults_;

@@ -160,6 +160,7 @@ void Environment::on_decision(const Decision& decision) {
   Decision one = decision;
   // what was asked between two steps changes the next
   one.step = std::max(one.step, step_count_ + 1);
+  std::erase_if(budgets_, [&](const SavedBudget& saved) { return saved.slot == one.slot; });
   if (commit_listener_ != nullptr) return commit_listener_->on_decision(*this, one);
   if (one.why != "swap") untold_.emplace_back(one, *one.host);
 }

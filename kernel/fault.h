@@ -39,8 +39,7 @@ class StageFault : public std::exception {
   }
 
   FaultKind kind;
-  std::string
-      detected_by;  // "pidfd" (its process ended), "deadline", "status", "wire", "structure", "numbers", "physics", "handshake" …
+  std::string detected_by;   // "pidfd" (its process ended), "deadline", "status", "wire", "structure", "numbers" …
   Slot slot = Slot::kSpace;  // filled where the slot is known
   std::string plugin;
   bool is_unread = false;  // it died before it looked at the request, which is not to blame
@@ -54,10 +53,9 @@ class StageFault : public std::exception {
 struct FaultRecord {
   std::uint32_t step;  // that was being made
   StageFault fault;
-  std::string recovered_by =
-      {};                     // "standby", "cold start", "rollback", "previous build", "fallback NAME"; empty: paused
-  std::string injected = {};  // kind of the fault that was ordered; empty: it came by itself
-  double recovery_us = 0.0;   // from when it was noticed to the good answer
+  std::string recovered_by = {};  // "standby", "cold start", "rollback", "previous build", "fallback NAME"; "": paused
+  std::string injected = {};      // kind of the fault that was ordered; empty: it came by itself
+  double recovery_us = 0.0;       // from when it was noticed to the good answer
 };
 
 // A fault that a worker is ordered to commit, to test who calls it.

@@ -9,18 +9,6 @@
 namespace gravitas::kernel {
 namespace {
 
-void add(Plan* plan, Slot slot, const SlotDescription& description) {
-  PlannedSlot& planned = plan->slots.emplace_back();
-  planned.slot = slot;
-  planned.hosting = description.hosting;
-  for (const PluginChoice& plugin : description.plugins) planned.plugins.push_back(plugin.declaration.name);
-}
-
-void leave_out(Plan* plan, SlotDescription* slot, const char* name, const char* why) {
-  slot->plugins.clear();
-  plan->left_out.push_back({name, why});
-}
-
 const char* why_none_sleeps(const EnvironmentDescription& d, bool has_contacts) {
   const auto may_sleep = [](const BodyDescription& body) { return (body.flags & kCanSleep) != 0; };
   if (d.sleep.energy == 0.0) return "SleepEnergy is 0";
@@ -33,18 +21,20 @@ const char* why_none_sleeps(const EnvironmentDescription& d, bool has_contacts) 
 
 Plan make_plan(EnvironmentDescription* d) {
   Plan plan;
-  if (d->bodies.empty()) {
-    leave_out(&plan, &d->integrator, "integrator", "there are no bodies");
-  } else {
-    add(&plan, Slot::kIntegrator, d->integrator);
-  }
-
+  const auto plan_for = [&](Slot slot, bool is_needed, const char* why_not) {
+    std::vector<PluginChoice>& plugins = d->slot(slot).plugins;
+    if (!is_needed) {
+      plugins.clear();
+      return plan.left_out.push_back({slot_name(slot), why_not});
+    }
+    PlannedSlot& planned = plan.slots.emplace_back();
+    planned.slot = slot;
+    planned.hosting = d->slot(slot).hosting;
+    for (const PluginChoice& plugin : plugins) planned.plugins.push_back(plugin.declaration.name);
+  };
   const bool has_forces = std::ranges::any_of(d->bodies, [](const BodyDescription& b) { return !b.forces.empty(); });
-  if (has_forces) {
-    add(&plan, Slot::kForce, d->force);
-  } else {
-    leave_out(&plan, &d->force, "force", "no force acts on any body");
-  }
+  plan_for(Slot::kIntegrator, !d->bodies.empty(), "there are no bodies");
+  plan_for(Slot::kForce, has_forces, "no force acts on any body");
 
   std::vector<TouchRights> rights;
   for (const BodyDescription& body : d->bodies) rights.push_back({body.flags, body.filter_group, body.filter_mask});
@@ -53,25 +43,11 @@ Plan make_plan(EnvironmentDescription* d) {
     throw std::invalid_argument(
         "the simulator Smooth moves bodies that cannot touch, and some of these can: leave out their geometry, forbid "
         "the pairs in CollisionFilter, or use Type = \"Basic\", \"Substepping\", \"Continuous\" or \"Bisection\"");
-  if (has_contacts) {
-    add(&plan, Slot::kSpace, d->space);
-    add(&plan, Slot::kCollision, d->collision);
-  } else {
-    leave_out(&plan, &d->space, "space", "no two bodies can touch");
-    leave_out(&plan, &d->collision, "collision", "no two bodies can touch");
-  }
-
-  if (!d->constraints.empty()) {
-    add(&plan, Slot::kConstraint, d->constraint);
-  } else {
-    leave_out(&plan, &d->constraint, "constraint", "there are no joints");
-  }
-
-  if (has_contacts || !d->constraints.empty()) {
-    add(&plan, Slot::kSolver, d->solver);
-  } else {
-    leave_out(&plan, &d->solver, "solver", "there are neither contacts nor joints");
-  }
+  const bool has_joints = !d->constraints.empty();
+  plan_for(Slot::kSpace, has_contacts, "no two bodies can touch");
+  plan_for(Slot::kCollision, has_contacts, "no two bodies can touch");
+  plan_for(Slot::kConstraint, has_joints, "there are no joints");
+  plan_for(Slot::kSolver, has_contacts || has_joints, "there are neither contacts nor joints");
   if (const char* why = why_none_sleeps(*d, has_contacts)) {
     d->sleep.energy = 0.0;
     plan.left_out.push_back({"sleep", why});

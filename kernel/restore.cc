@@ -114,6 +114,7 @@ double Environment::length_of_step(std::uint32_t step) const {
 SavedState Environment::saved_state() const {
   SavedState saved{step_count_, length_of_step(step_count_), is_anew_, state_hash_, chain_hash_, figures_, wake_orders_,
                    {}};
+  saved.budgets = budgets_;
   front().visit_columns([&](const char* name, StateRows, std::uint32_t, const auto& column) {
     saved.columns.push_back({name, std::span(column.data(), column.size())});
   });
@@ -158,6 +159,8 @@ std::string Environment::restore(const SavedState& saved) {
     ColumnReader(saved_state().columns, model_, front()).read_into(back());
     return problem;
   }
+  for (const SavedBudget& one : budgets_ = saved.budgets)
+    if (Budget* budget = slot_of(one.slot).budget_of(one.target)) *budget = one.budget;
   std::swap(front_, back_);
   is_idle_ = false;
   wake_orders_ = saved.wake_orders;

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "plugin_sdk/plugin.h"
 #include "plugin_sdk/trajectory_hash.h"
 
 namespace gravitas::kernel {
@@ -16,6 +17,18 @@ namespace gravitas::kernel {
 struct CommitFigures {
   double penetration = 0.0;
   double joint_error = 0.0;
+};
+
+// What the ladder of a slot (slot_host.h) knows of the failures of a plugin's host.
+struct Budget {
+  std::uint32_t failures = 0, failures_in_a_row = 0;
+  std::uint64_t good_answers = 0;  // since the last failure
+};
+
+struct SavedBudget {
+  Slot slot;
+  std::uint32_t target;  // of the slot's plugins
+  Budget budget;
 };
 
 struct SavedColumn {
@@ -31,6 +44,7 @@ struct SavedState {
   CommitFigures figures;
   std::vector<std::uint32_t> wake_orders;  // bodies that are awake with the next step
   std::vector<SavedColumn> columns;        // all of State::visit_columns(), in its order
+  std::vector<SavedBudget> budgets = {};   // those with failures
 };
 
 }  // namespace gravitas::kernel

@@ -69,6 +69,10 @@ class StageSlot {
   std::string why_no_fallback(std::uint32_t target) const {
     return hosts_[routes_[target].host]->why_no_fallback(which_);
   }
+  // Of the host of the plugin in row `target`; null where there is none.
+  Budget* budget_of(std::uint32_t target) {
+    return is_running() && target < routes_.size() ? &host_of(target).budget_of(which_) : nullptr;
+  }
   Slot which() const { return which_; }
   const SlotDescription& description() const { return description_; }
   std::vector<std::string> take_complaints();

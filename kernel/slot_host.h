@@ -18,6 +18,7 @@
 
 #include "kernel/carrier/carrier.h"
 #include "kernel/fault.h"
+#include "kernel/saved_state.h"
 #include "kernel/spare.h"
 #include "plugin_sdk/slots.h"
 
@@ -64,6 +65,7 @@ class SlotHost {
   std::uint32_t wanted_standbys() const;
   // What its processes, past ones included, said went wrong besides their answers; taken out.
   std::vector<std::string> take_complaints();
+  Budget& budget_of(Slot slot) { return budgets_[static_cast<std::size_t>(slot)]; }
   void count_good_answer(Slot slot) { ++budget_of(slot).good_answers; }
 
   // After a failed call of the fault's slot: the next host is in place, for the same request again. Throws the last
@@ -83,11 +85,6 @@ class SlotHost {
   void retire(std::unique_ptr<Spare> spare);
 
  private:
-  struct Budget {
-    std::uint32_t failures = 0, failures_in_a_row = 0;
-    std::uint64_t good_answers = 0;  // since the last failure
-  };
-  Budget& budget_of(Slot slot) { return budgets_[static_cast<std::size_t>(slot)]; }
   std::string take_host();
   // Empty: there is none.
   std::string next_rung(Slot slot);

@@ -320,6 +320,16 @@ std::vector<std::uint32_t> new_rows(const std::vector<std::uint32_t>& old_row, s
   return rows;
 }
 
+// Of a slot's plugin, by its name; kNone if it is gone.
+std::uint32_t row_after(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& next,
+                        Slot slot, std::uint32_t row) {
+  const std::string& name = before.slot(slot).plugins.at(row).declaration.name;
+  const std::vector<kernel::PluginChoice>& plugins = next.slot(slot).plugins;
+  for (std::uint32_t i = 0; i < plugins.size(); ++i)
+    if (plugins[i].declaration.name == name) return i;
+  return kNone;
+}
+
 void translate(const std::vector<std::uint32_t>& rows, Numbers* numbers) {
   for (std::uint32_t& row : std::get<std::vector<std::uint32_t>>(*numbers)) row = rows[row];
 }
@@ -453,6 +463,10 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
           saved.columns.push_back({column.name, std::span(numbers)});
         },
         columns.at(column.name));
+  for (kernel::SavedBudget one : before.budgets) {
+    one.target = row_after(before_, description_, one.slot, one.target);
+    if (one.target != kNone) saved.budgets.push_back(one);
+  }
   if (const std::string problem = next->restore(saved); !problem.empty())
     throw std::logic_error("the edited scene does not take the state: " + problem);
   for (const std::uint32_t body : now.wake_orders())
@@ -484,13 +498,8 @@ void keep_who_answers(const kernel::EnvironmentDescription& before, const kernel
 void translate_decisions(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& next,
                          std::vector<recorder::v1::Decision>* decisions) {
   std::erase_if(*decisions, [&](recorder::v1::Decision& decision) {
-    const Slot slot = *find_slot(decision.slot());
-    const std::string& name = before.slot(slot).plugins.at(decision.target()).declaration.name;
-    const std::vector<kernel::PluginChoice>& plugins = next.slot(slot).plugins;
-    const auto same =
-        std::ranges::find_if(plugins, [&](const kernel::PluginChoice& one) { return one.declaration.name == name; });
-    if (same != plugins.end()) decision.set_target(static_cast<std::uint32_t>(same - plugins.begin()));
-    return same == plugins.end();
+    decision.set_target(row_after(before, next, *find_slot(decision.slot()), decision.target()));
+    return decision.target() == kNone;
   });
 }
 

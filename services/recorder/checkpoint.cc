@@ -11,7 +11,9 @@
 #include <stdexcept>
 #include <variant>
 
+#include "plugin_sdk/body.h"
 #include "plugin_sdk/channel/digest.h"
+#include "plugin_sdk/slots.h"
 #include "services/recorder/identity.h"
 
 namespace gravitas {
@@ -118,6 +120,14 @@ Checkpoint make_checkpoint(const kernel::Environment& environment, const recorde
   });
   *checkpoint.mutable_tally() = tally;
   for (const recorder::v1::Decision& decision : decisions) *checkpoint.add_decisions() = decision;
+  for (const auto& [slot, target, budget] : saved.budgets) {
+    recorder::v1::Budget* message = checkpoint.add_budgets();
+    message->set_slot(slot_name(slot));
+    message->set_target(target);
+    message->set_failures(budget.failures);
+    message->set_failures_in_a_row(budget.failures_in_a_row);
+    message->set_good_answers(budget.good_answers);
+  }
   return checkpoint;
 }
 
@@ -186,6 +196,13 @@ kernel::SavedState saved_state_of(Checkpoint* checkpoint) {
   visit_columns(checkpoint->mutable_state(), [&]<typename T>(const char* name, pb::RepeatedField<T>* column) {
     saved.columns.push_back({name, std::span<const T>(column->data(), static_cast<std::size_t>(column->size()))});
   });
+  for (const recorder::v1::Budget& one : checkpoint->budgets()) {
+    // no slot has a plugin in that row
+    const std::optional<Slot> slot = find_slot(one.slot());
+    saved.budgets.push_back({slot.value_or(Slot::kSpace),
+                             slot ? one.target() : kNone,
+                             {one.failures(), one.failures_in_a_row(), one.good_answers()}});
+  }
   return saved;
 }
 

@@ -363,6 +363,30 @@ TEST_F(Ladder, AFallbackThatTakesOverBetweenStepsMakesTheNext) {
   EXPECT_THAT(witness.decisions, ElementsAre("fallback Drag at 3: Drag, shm"));
 }
 
+TEST_F(Ladder, FailuresGoAlongWithTheState) {
+  Environment failing(world(0).description(), starter({Fate::kDiesAtFourthCall, Fate::kServes}));
+  EXPECT_THAT(failing.saved_state().budgets, IsEmpty());
+  run(&failing);
+  const kernel::SavedState saved = failing.saved_state();
+  ASSERT_EQ(saved.budgets.size(), 1U);
+  EXPECT_EQ(saved.budgets[0].slot, Slot::kSolver);
+  EXPECT_EQ(saved.budgets[0].target, 0U);
+  EXPECT_EQ(saved.budgets[0].budget.failures, 1U);
+  EXPECT_GE(saved.budgets[0].budget.good_answers, kLadderSteps - 3);
+  // one more is one too many in whoever takes the state
+  WorldBuilder builder = world(0).steps(2 * kLadderSteps, 0.01);
+  builder.description().solver.failures = 2;
+  Environment resumed(builder.description(), starter({Fate::kDiesAtFourthCall, Fate::kServes}));
+  ASSERT_EQ(resumed.restore(saved), "");
+  ASSERT_EQ(resumed.saved_state().budgets.size(), 1U);
+  EXPECT_EQ(resumed.saved_state().budgets[0].budget.failures, 1U);
+  while (resumed.step() == StepOutcome::kCommitted && resumed.step_count() < 2 * kLadderSteps) {
+  }
+  EXPECT_TRUE(resumed.fault());
+  // after that they are counted anew
+  EXPECT_THAT(resumed.saved_state().budgets, IsEmpty());
+}
+
 TEST_F(Ladder, WhoIsAskedAfterItsEndSaysSo) {
   WorldBuilder builder = world(0);
   builder.description().force.standbys = 0;
