@@ -216,13 +216,13 @@ void StageSlot::note_recovery(const Attempts& attempts) {
   }
 }
 
-void StageSlot::let_all_adopt(const SlotHost& host, const std::string& why) {
+void StageSlot::let_all_adopt(const SlotHost& host, const std::string& why, std::uint32_t swapped) {
   const std::uint32_t revision = host.revision();
   for (StageSlot* slot : slots_)
-    if (host.revision() == revision) slot->adopt(host, why, slot == this);
+    if (host.revision() == revision) slot->adopt(host, why, slot == this, swapped);
 }
 
-void StageSlot::adopt(const SlotHost& host, const std::string& why, bool by_us) {
+void StageSlot::adopt(const SlotHost& host, const std::string& why, bool by_us, std::uint32_t swapped) {
   const SlotDescription& now = host.description();
   needs_attention_ = true;
   // who comes in is asked, and may fail: then all have adopted who came after
@@ -239,7 +239,8 @@ void StageSlot::adopt(const SlotHost& host, const std::string& why, bool by_us) 
     if (place == 0) description_.hosting = now.hosting;
     for (PendingSwap& swap : pending_)
       if (swap.only_compare && swap.target == target) count_anew(&swap, !is_same_plugin(plugin, before));
-    observer_->on_decision({which_, target, step_, why, &now, &description_.plugins[target]});
+    if (!by_us || swapped == kNone || swapped == target)
+      observer_->on_decision({which_, target, step_, why, &now, &description_.plugins[target]});
     observer_->on_plugin_change(*this, target, before);
   }
 }

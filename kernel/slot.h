@@ -171,9 +171,9 @@ class StageSlot {
   void close_probation(const SlotHost* host, SwapState state, const std::string& reason);
   void close_all_probations(SlotHost* host, SwapState state, const std::string& reason);
   void update_watch();
-  // The plugins of a host have changed: tells, and notes who serves the routes; `by_us`: for the sake of this slot.
-  void adopt(const SlotHost& host, const std::string& why, bool by_us);
-  void let_all_adopt(const SlotHost& host, const std::string& why);
+  // The plugins of a host have changed: tells, and notes who serves; `by_us`: for this slot, whose row `swapped` changes.
+  void adopt(const SlotHost& host, const std::string& why, bool by_us, std::uint32_t swapped);
+  void let_all_adopt(const SlotHost& host, const std::string& why, std::uint32_t swapped = kNone);
 
   void watch(const StageCall& call, const CallTimes& times, Arena* arena, DerivativeSource* derivatives,
              const std::function<void()>& recheck);

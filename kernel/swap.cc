@@ -169,7 +169,7 @@ void StageSlot::cut_over(PendingSwap* swap) {
   probation_.push_back({&host, swap->record});
   // who comes in is asked already: a comparison that is lost in that would be taken out from under this swap
   is_watched_ = false;
-  let_all_adopt(host, "swap");
+  let_all_adopt(host, "swap", swap->target);
   swaps_[swap->record].pause_us = microseconds(start);
 }
 

@@ -41,6 +41,22 @@ std::string exchange_warning(const kernel::FaultRecord& record) {
   return {};
 }
 
+// Among the first `known` of the report; null if it is not there.
+report::v1::SwapRecord* find_swap(const kernel::SwapRecord& record, int known, report::v1::Report* report) {
+  for (int i = known; i-- > 0;) {
+    report::v1::SwapRecord& one = *report->mutable_swaps(i);
+    if (one.step() == record.step && one.slot() == slot_name(record.slot) &&
+        plugin_of(one.to()) == plugin_of(record.to))
+      return &one;
+  }
+  return nullptr;
+}
+
+bool is_to_come(const report::v1::SwapRecord& swap) {
+  return swap.outcome() == swap_state_name(kernel::SwapState::kPreparing) ||
+         swap.outcome() == swap_state_name(kernel::SwapState::kShadow);
+}
+
 }  // namespace
 
 void write_stages(const kernel::Environment& environment, report::v1::Report* report) {
@@ -160,7 +176,14 @@ std::string disagreement_text(const report::v1::Disagreement& disagreement) {
 }
 
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report) {
+  const int known = report->swaps_size();
   for (const kernel::SwapRecord& one : environment.swaps()) {
+    if (report::v1::SwapRecord* before = one.only_compared ? nullptr : find_swap(one, known, report)) {
+      if (before->outcome() != swap_state_name(kernel::SwapState::kProbation)) continue;
+      before->set_outcome(swap_state_name(one.state));
+      before->set_reason(one.reason);
+      continue;
+    }
     report::v1::SwapRecord* swap = one.only_compared ? report->add_comparisons() : report->add_swaps();
     swap->set_step(std::max(one.step, one.since));
     swap->set_slot(slot_name(one.slot));
@@ -173,6 +196,19 @@ void write_swaps(const kernel::Environment& environment, report::v1::Report* rep
     write_comparison(one.shadow, environment, swap->mutable_shadow());
   }
   std::ranges::stable_sort(*report->mutable_comparisons(), {}, &report::v1::SwapRecord::step);
+}
+
+void write_swaps(const kernel::Environment& environment, const report::v1::Report& before, recorder::v1::Tally* tally) {
+  report::v1::Report all;
+  *all.mutable_swaps() = before.swaps();
+  write_swaps(environment, &all);
+  tally->clear_swaps();
+  for (report::v1::SwapRecord& swap : *all.mutable_swaps()) {
+    // those of later steps are ordered again
+    const bool is_refused = swap.outcome() == swap_state_name(kernel::SwapState::kRefused);
+    if (swap.step() <= environment.step_count() + (is_refused ? 0 : 1) && !is_to_come(swap))
+      *tally->add_swaps() = std::move(swap);
+  }
 }
 
 report::v1::Plan plan_message(const kernel::Environment& environment,

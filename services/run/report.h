@@ -4,6 +4,7 @@
 #include <string>
 
 #include "gravitas/edit/v1/edit.pb.h"
+#include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
 
@@ -17,7 +18,10 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
 void write_stages(const kernel::Environment& environment, report::v1::Report* report);
 // With a warning where another plugin answers since.
 void write_faults(const kernel::Environment& environment, report::v1::Report* report);
+// One that the report has is made again where a run goes on, and has its outcome there if it was on probation.
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report);
+// With those of before: what a checkpoint keeps of them.
+void write_swaps(const kernel::Environment& environment, const report::v1::Report& before, recorder::v1::Tally* tally);
 void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to);
 void note_edit(const edit::v1::Edit& edit, report::v1::Report* report);
 

@@ -245,6 +245,7 @@ class Run final : private kernel::CommitListener {
     from_checkpoint(options_.resume, [&] { restore(&from->checkpoint, answering, catalog_, environment_.get()); });
     resumed_tally_ = from->checkpoint.tally();
     journal_ = std::move(from->journal);
+    *result_.report.mutable_swaps() = resumed_tally_.swaps();
     figures_->resume(resumed_tally_, from->checkpoint.edits_size() > 0);
     attend();
     // else nobody is left to ask
@@ -480,6 +481,7 @@ class Run final : private kernel::CommitListener {
     if (result_.outcome != RunOutcome::kPaused) result_.outcome = RunOutcome::kFailed;
     if (result_.fault.find(why) == std::string::npos) result_.fault += (result_.fault.empty() ? "" : "; ") + why;
   }
+    write_swaps(*environment_, result_.report, &tally);
 
   // What the report counts, for a checkpoint.
   recorder::v1::Tally tally() const {

@@ -194,9 +194,58 @@ TEST(ResumedSwap, GoesBackToTheSwapBefore) {
   rest.resume = part.checkpoint;
   const RunResult resumed = run_quietly(rest);
   EXPECT_EQ(resumed.report.chain_hash(), whole.report.chain_hash());
-  ASSERT_EQ(resumed.report.swaps_size(), 1);
-  EXPECT_EQ(resumed.report.swaps(0).from(), "Verlet");
-  EXPECT_EQ(resumed.report.swaps(0).outcome(), "rolled back");
+  ASSERT_EQ(resumed.report.swaps_size(), 2);
+  EXPECT_EQ(resumed.report.swaps(1).from(), "Verlet");
+  EXPECT_EQ(resumed.report.swaps(1).outcome(), "rolled back");
+}
+
+// "before step 10: force BasicForce -> BasicForce, committed".
+std::vector<std::string> told_swaps(const report::v1::Report& report) {
+  std::vector<std::string> told;
+  for (const report::v1::SwapRecord& one : report.swaps())
+    told.push_back("before step " + std::to_string(one.step()) + ": " + one.slot() + " " + one.from() + " -> " +
+                   one.to() + ", " + one.outcome());
+  return told;
+}
+
+// Of slots with one plugin and with several, one after the other, rolled back and before an edit: those of a run that never
+// stopped, once each.
+TEST(ResumedSwap, IsReportedAsInTheRunThatNeverStopped) {
+  const ScratchFolder folder;
+  struct Story {
+    std::string scene;
+    std::vector<std::string> swaps, faults, edits;
+  };
+  for (const Story& story :
+       {Story{kCallbacks, {"force=BasicForce@step=10", "force=Gravity@step=20", "force=BasicForce@step=45"}, {}, {}},
+        Story{"two_spheres_motor",
+              {"solver=Newton@step=10", "solver=Direct@step=22", "solver=Sequential@step=24", "solver=Newton@step=50"},
+              {"solver:kill@step=26"},
+              {}},
+        Story{"two_spheres_motor", {"solver=Newton@step=10"}, {}, {"set Body.Ground.CanSleep=false@step=12"}}}) {
+    RunOptions whole = options_of(story.scene, Hosting::kSharedMemory, 60);
+    whole.swaps = story.swaps, whole.faults = story.faults, whole.edits = story.edits;
+    const RunResult expected = run_quietly(whole);
+    ASSERT_EQ(expected.outcome, RunOutcome::kCompleted) << expected.fault;
+    ASSERT_EQ(told_swaps(expected.report).size(), story.swaps.size());
+    for (const std::uint32_t stop : {9U, 15U, 25U, 40U}) {
+      RunOptions part = whole;
+      part.steps = stop;
+      part.checkpoint = folder.path("checkpoint");
+      ASSERT_EQ(run_quietly(part).outcome, RunOutcome::kCompleted);
+      RunOptions rest = whole;
+      rest.resume = part.checkpoint;
+      // and once more, with what the second run has kept
+      rest.steps = 55;
+      rest.checkpoint = folder.path("next");
+      ASSERT_EQ(run_quietly(rest).outcome, RunOutcome::kCompleted);
+      rest = whole;
+      rest.resume = folder.path("next");
+      const RunResult resumed = run_quietly(rest);
+      EXPECT_EQ(told_swaps(resumed.report), told_swaps(expected.report)) << story.scene << " from step " << stop;
+      EXPECT_EQ(resumed.report.chain_hash(), expected.report.chain_hash()) << story.scene << " from step " << stop;
+    }
+  }
 }
 
 // The checkpoint that a paused run leaves knows of it, and so does the command that goes on.
