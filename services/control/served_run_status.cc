@@ -116,7 +116,7 @@ api::Status ServedRun::status_now() {
   keep_last(status.mutable_swaps());
   report::v1::Report report = past_;
   write_faults(*environment_, &report);
-  name_orders(injected_, description_, environment_->step_count(), state_ == State::kFinished, &report);
+  name_orders(injected_, description_, {0, environment_->step_count()}, state_ == State::kFinished, &report);
   for (const std::string& warning : report.warnings()) add_warning(warning);
   status.set_fault_count(static_cast<std::uint32_t>(report.faults_size()));
   status.mutable_faults()->Swap(report.mutable_faults());

@@ -212,7 +212,7 @@ std::string fault_text(const kernel::FaultInjection& fault) {
 }
 
 void name_orders(std::span<const kernel::FaultInjection> orders, const kernel::EnvironmentDescription& description,
-                 std::uint32_t steps, bool is_over, report::v1::Report* report) {
+                 StepsMade steps, bool is_over, report::v1::Report* report) {
   for (const kernel::FaultInjection& order : orders) {
     const Trace trace = trace_of(order.order);
     std::uint32_t found = 0;
@@ -234,8 +234,13 @@ void name_orders(std::span<const kernel::FaultInjection> orders, const kernel::E
       fault.set_ordered(fault_text(order));
       ++found;
     }
-    if (found == 0 && trace.is_sure && order.step + (trace.is_seen_later && !is_over ? 1 : 0) <= steps &&
-        !was_told(*report, trace.kind, order.step))
+    if (found > 0 || !trace.is_sure || order.step + (trace.is_seen_later && !is_over ? 1 : 0) > steps.last ||
+        was_told(*report, trace.kind, order.step))
+      continue;
+    if (order.step <= steps.checkpoint)
+      report->add_warnings(fmt::format("fault {} is left out: that step lies before the checkpoint of step {}",
+                                       fault_text(order), steps.checkpoint));
+    else
       report->add_warnings(fmt::format("fault {} shows in no failed call: {}", fault_text(order),
                                        trace.is_seen_later ? "nobody of that process was asked anything after it"
                                                            : "its slot was not asked anything in that step"));

@@ -26,9 +26,13 @@ void order_fault(const kernel::FaultInjection& fault, const kernel::EnvironmentD
 std::string fault_text(const kernel::FaultInjection& fault);
 
 // Says of the report's faults which orders they come from, be it that a worker died between two calls; and warns of orders
-// that should have shown in a failed call of the `steps` made, or in the first of the next if there is one, and did not. What
+// that should have shown in a failed call of the steps made, or in the first of the next if there is one, and did not. What
 // the report says was not injected is left at that.
+struct StepsMade {
+  std::uint32_t checkpoint;  // the run went on from that step; 0: from the start
+  std::uint32_t last;
+};
 void name_orders(std::span<const kernel::FaultInjection> orders, const kernel::EnvironmentDescription& description,
-                 std::uint32_t steps, bool is_over, report::v1::Report* report);
+                 StepsMade steps, bool is_over, report::v1::Report* report);
 
 }  // namespace gravitas

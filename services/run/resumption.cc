@@ -6,14 +6,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 
+#include "plugin_sdk/plugin.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/identity.h"
 #include "services/recorder/library_digest.h"
 #include "services/recorder/recorder.h"
+#include "services/run/kernel_names.h"
 #include "services/run/session.h"
 
 namespace gravitas {
@@ -116,6 +119,27 @@ Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel:
   answering.begun = answering.now;
   take_back_swaps(decisions, catalog, description, &answering.begun);
   return answering;
+}
+
+void warn_of_unknown_swaps(std::span<const kernel::SwapOrder> orders, const recorder::v1::Checkpoint& checkpoint,
+                           std::vector<std::string>* warnings) {
+  for (const kernel::SwapOrder& order : orders) {
+    const std::string& plugin = order.plugin.declaration.name;
+    const auto is_it = [&](const auto& known, std::string_view name) {
+      return known.slot() == slot_name(order.slot) && known.step() == order.step && name == plugin;
+    };
+    const auto is_told = [&](const report::v1::SwapRecord& swap) { return is_it(swap, plugin_of(swap.to())); };
+    const auto is_decided = [&](const recorder::v1::Decision& decision) {
+      return is_it(decision, decision.plugin()) || is_it(decision.before(), decision.before().plugin());
+    };
+    if (order.step > checkpoint.step() || std::ranges::any_of(checkpoint.tally().swaps(), is_told) ||
+        std::ranges::any_of(checkpoint.decisions(), is_decided))
+      continue;
+    warnings->push_back(
+        fmt::format("--swap {}={} at step {}: the checkpoint of step {} knows of none there: it was refused then, or "
+                    "not ordered",
+                    slot_name(order.slot), plugin, order.step, checkpoint.step()));
+  }
 }
 
 void restore(recorder::v1::Checkpoint* checkpoint, const kernel::EnvironmentDescription& now, const Catalog& catalog,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,10 @@ struct Answering {
 // Of the description with the checkpoint's edits. Throws std::runtime_error where a plugin is not to be had.
 Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel::EnvironmentDescription& description,
                        const Catalog& catalog);
+
+// Says of swaps that were ordered for steps up to the checkpoint's that it knows of none there.
+void warn_of_unknown_swaps(std::span<const kernel::SwapOrder> orders, const recorder::v1::Checkpoint& checkpoint,
+                           std::vector<std::string>* warnings);
 
 // Makes the swaps again in an environment that has begun so, and restores its state. Throws std::runtime_error.
 void restore(recorder::v1::Checkpoint* checkpoint, const kernel::EnvironmentDescription& now, const Catalog& catalog,

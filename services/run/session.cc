@@ -246,6 +246,8 @@ class Run final : private kernel::CommitListener {
     resumed_tally_ = from->checkpoint.tally();
     journal_ = std::move(from->journal);
     *result_.report.mutable_swaps() = resumed_tally_.swaps();
+    resumed_step_ = from->checkpoint.step();
+    journal_ = std::move(from->journal);
     figures_->resume(resumed_tally_, from->checkpoint.edits_size() > 0);
     attend();
     // else nobody is left to ask
@@ -267,13 +269,7 @@ class Run final : private kernel::CommitListener {
   // them. Swaps of the command line up to the checkpoint are done, or were refused.
   void apply_decisions(const Resumption& resumed, Answering* answering) {
     const std::uint32_t step = resumed.checkpoint.step();
-    for (const kernel::SwapOrder& one : swaps_)
-      if (one.step <= step && std::ranges::find(resumed.checkpoint.decisions(), slot_name(one.slot),
-                                                &recorder::v1::Decision::slot) == resumed.checkpoint.decisions().end())
-        warnings_.push_back(
-            fmt::format("--swap {} at step {}: the checkpoint of step {} knows of none there: it was refused "
-                        "then, or not ordered",
-                        slot_name(one.slot), one.step, step));
+    warn_of_unknown_swaps(swaps_, resumed.checkpoint, &warnings_);
     // one of a step that was not made is in the checkpoint already
     const auto is_restored = [&](const kernel::SwapOrder& one) {
       return std::ranges::any_of(resumed.checkpoint.decisions(), [&](const recorder::v1::Decision& decision) {
@@ -534,6 +530,7 @@ class Run final : private kernel::CommitListener {
   std::optional<PairDecisions> pair_decisions_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
+  std::uint32_t resumed_step_ = 0;     // likewise
   recorder::v1::Tally resumed_tally_;  // of the checkpoint
   JournalReading journal_;             // of the checkpoint
   std::unique_ptr<TrajectoryWriter> trajectory_;
@@ -576,7 +573,7 @@ void Run::write_report() {
   write_past();
   if (recorder_ && !recorder_->warning().empty()) warnings_.push_back(recorder_->warning());
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
-  name_orders(faults_, description_, report.steps(), true, &report);
+  name_orders(faults_, description_, {resumed_step_, report.steps()}, true, &report);
   if (!edits_.made().empty()) report.add_warnings("times of stages and steps are those since the last edit");
   fold_warnings(&report);
   write_stages(*environment_, &report);

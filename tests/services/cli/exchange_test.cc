@@ -191,6 +191,34 @@ TEST(Exchange, AResumedRunGoesOnWithWhoeverAnswered) {
   }
 }
 
+// Swaps before the checkpoint that it does not know are told, also where it knows others of the slot.
+TEST(Exchange, AResumedRunTellsSwapsThatItsCheckpointDoesNotKnow) {
+  const ScratchFolder folder;
+  const std::string kept = folder.path("kept"), report = folder.path("report.json");
+  const auto unknown = [&](const std::vector<std::string>& swaps) {
+    std::vector<std::string> words = {"run", kSample, "--hosting", "direct", "--report", report};
+    if (std::filesystem::exists(kept))
+      words.insert(words.end(), {"--steps", "40", "--resume", kept});
+    else
+      words.insert(words.end(), {"--steps", "30", "--checkpoint", kept});
+    for (const std::string& swap : swaps) words.insert(words.end(), {"--swap", swap});
+    EXPECT_EQ(run_program(words, folder).exit_code, 0);
+    std::vector<std::string> told;
+    const report::v1::Report resumed = read_report(read_file(report));
+    for (const std::string& warning : resumed.warnings())
+      if (warning.find("knows of none there") != std::string::npos)
+        told.push_back(warning.substr(0, warning.find(':')));
+    return told;
+  };
+  const std::vector<std::string> ordered = {"solver=Newton@step=10", "solver=Direct@step=12",
+                                            "solver=Sequential@step=20"};
+  EXPECT_THAT(unknown(ordered), ::testing::IsEmpty());
+  EXPECT_THAT(unknown(ordered), ::testing::IsEmpty());
+  EXPECT_THAT(unknown({"solver=Direct@step=10", "solver=Newton@step=15", "integrator=RK4@step=30"}),
+              ::testing::ElementsAre("--swap solver=Direct at step 10", "--swap solver=Newton at step 15",
+                                     "--swap integrator=RK4 at step 30"));
+}
+
 // Nobody asked for a checkpoint; what a pause leaves knows it all the same.
 TEST(Exchange, APauseRemembersWhoAnswered) {
   const ScratchFolder folder;

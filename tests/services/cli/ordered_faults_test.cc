@@ -55,6 +55,27 @@ TEST(OrderedFaults, WhatNobodyMissedIsToldToo) {
   EXPECT_THAT(run.report.warnings(), Contains(HasSubstr("fault solver:kill,at=reply@step=40 shows in no failed call")));
 }
 
+TEST(OrderedFaults, WhatLiesBeforeACheckpointIsToldAsThat) {
+  const ScratchFolder folder;
+  const std::string kept = folder.path("kept"), report = folder.path("report.json");
+  const std::vector<std::string> part = {"run", kSample, "--steps", "20", "--checkpoint", kept};
+  ASSERT_EQ(run_program(part, folder).exit_code, 0);
+  const std::vector<std::string> rest = {"run",      kSample,
+                                         "--steps",  "40",
+                                         "--resume", kept,
+                                         "--report", report,
+                                         "--fault",  "solver:kill@step=15",
+                                         "--fault",  "solver:kill@step=20",
+                                         "--fault",  "solver:kill@step=21"};
+  ASSERT_EQ(run_program(rest, folder).exit_code, 0);
+  const report::v1::Report told = read_report(harness::read_file(report));
+  for (const char* step : {"15", "20"})
+    EXPECT_THAT(told.warnings(), Contains(std::string("fault solver:kill@step=") + step +
+                                          " is left out: that step lies before the checkpoint of step 20"));
+  EXPECT_THAT(told.warnings(), Not(Contains(HasSubstr("shows in no failed call"))));
+  EXPECT_EQ(told.faults_size(), 1);
+}
+
 TEST(OrderedFaults, APauseByTheNumberOfFailuresSaysSo) {
   const OrderedRun run = ordered_run({}, kFiveKills);
   EXPECT_EQ(run.program.exit_code, 3);
