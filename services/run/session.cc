@@ -78,6 +78,7 @@ class Run final : private kernel::CommitListener {
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
     read_edits(resumed ? &*resumed : nullptr);
     read_orders();
+    edits_.rehearse(options_, scene_, description_, &catalog_, {swaps_, comparisons_, faults_});
     read_kinds();
     Answering answering{description_, description_};
     if (resumed) apply_decisions(*resumed, &answering);
@@ -244,7 +245,6 @@ class Run final : private kernel::CommitListener {
   void resume(Resumption* from, const kernel::EnvironmentDescription& answering) {
     from_checkpoint(options_.resume, [&] { restore(&from->checkpoint, answering, catalog_, environment_.get()); });
     resumed_tally_ = from->checkpoint.tally();
-    journal_ = std::move(from->journal);
     *result_.report.mutable_swaps() = resumed_tally_.swaps();
     resumed_step_ = from->checkpoint.step();
     journal_ = std::move(from->journal);
@@ -295,7 +295,7 @@ class Run final : private kernel::CommitListener {
     for (auto* one : {&answering->now, &answering->begun}) apply_hosting(options_.hosting, one);
   }
 
-  // Edits of the checkpoint have been made; those of the journal and the command line are to come, and are rehearsed.
+  // Edits of the checkpoint have been made; those of the journal and the command line are to come.
   void read_edits(const Resumption* resumed) {
     edits_.plan(parse_edits(options_.edits));
     require_separate_files(options_, scene_, edits_.to_come());
@@ -307,7 +307,6 @@ class Run final : private kernel::CommitListener {
       }
       edits_.leave_out_past(resumed->checkpoint.step(), resumed->journal.edits);
     }
-    edits_.rehearse(options_, scene_, description_, &catalog_);
   }
 
   void take(const EditedScene& edited) {
@@ -477,12 +476,12 @@ class Run final : private kernel::CommitListener {
     if (result_.outcome != RunOutcome::kPaused) result_.outcome = RunOutcome::kFailed;
     if (result_.fault.find(why) == std::string::npos) result_.fault += (result_.fault.empty() ? "" : "; ") + why;
   }
-    write_swaps(*environment_, result_.report, &tally);
 
   // What the report counts, for a checkpoint.
   recorder::v1::Tally tally() const {
     recorder::v1::Tally tally = resumed_tally_;
     figures_->write(&tally);
+    write_swaps(*environment_, result_.report, &tally);
     if (events_) events_->write(&tally);
     return tally;
   }
@@ -530,8 +529,8 @@ class Run final : private kernel::CommitListener {
   std::optional<PairDecisions> pair_decisions_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
-  std::uint32_t resumed_step_ = 0;     // likewise
   recorder::v1::Tally resumed_tally_;  // of the checkpoint
+  std::uint32_t resumed_step_ = 0;     // likewise
   JournalReading journal_;             // of the checkpoint
   std::unique_ptr<TrajectoryWriter> trajectory_;
   std::optional<OutputFile> report_;

@@ -480,5 +480,33 @@ TEST(EditedRun, WhatCannotBeIsSaidBeforeTheRunBegins) {
   EXPECT_EQ(run.end().size(), 1U);
 }
 
+// Of the solver, when the last joint goes between bodies that cannot touch.
+TEST(EditedRun, WhatIsOrderedOfASlotThatAnEditLeavesOutIsRefusedBeforeTheRunBegins) {
+  EditedRun run(scene(ball("A", "") + ball("B", "Position = {1, 0, 0}"),
+                      "CollisionFilter { DefaultAllow = false }\n"
+                      "Constraints { Constraint { Type = \"Spherical\" Id = \"Hang\" Body1 = \"A\" Body2 = \"B\" "
+                      "CustomProperties { BindPoint = {0.5, 0, 0} } } }"),
+                {"set Body.A.Mass=3@step=10", "remove Constraint.Hang@step=20"});
+  run.options.hosting = {{std::nullopt, Hosting::kSharedMemory}};
+  const std::string gone =
+      ": after the edit before step 20 the plan leaves the slot out: there are neither contacts nor joints";
+  run.options.swaps = {"solver=Newton@step=30"};
+  EXPECT_EQ(run.refusal(), "--swap solver=Newton at step 30" + gone);
+  run.options.swaps = {"solver=Newton@step=20"};
+  EXPECT_EQ(run.refusal(), "--swap solver=Newton at step 20" + gone);
+  run.options.swaps.clear();
+  run.options.comparisons = {"solver=Newton"};
+  EXPECT_EQ(run.refusal(), "--compare solver=Newton" + gone);
+  run.options.comparisons.clear();
+  run.options.faults = {"solver:kill@step=20"};
+  EXPECT_EQ(run.refusal(), "--fault solver:kill@step=20" + gone);
+  // before that edit it is there
+  run.options.swaps = {"solver=Newton@step=19"};
+  run.options.faults = {"solver:kill@step=5"};
+  const RunResult result = run.run();
+  EXPECT_EQ(result.report.faults_size(), 1);
+  EXPECT_EQ(result.report.swaps_size(), 1);
+}
+
 }  // namespace
 }  // namespace gravitas::edited
