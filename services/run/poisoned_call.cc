@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "plugin_sdk/shell_word.h"
 #include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
 #include "services/run/session.h"
@@ -36,7 +37,7 @@ std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, co
     writer.close();
     return fmt::format(
         "slot {}, plugin {}: the request that it fails at in step {} is kept; to ask it alone: gravitas replay {}",
-        header.slot(), poisoned.plugin.declaration.name, step, path);
+        header.slot(), poisoned.plugin.declaration.name, step, shell_word(path));
   } catch (const std::runtime_error& problem) {
     return fmt::format("the request that plugin {} fails at in step {} could not be kept: {}",
                        poisoned.plugin.declaration.name, step, problem.what());

@@ -79,21 +79,22 @@ TEST(Checkpoints, APausedRunNamesTheOneItWroteAndTheCommandThatGoesOn) {
 TEST(Checkpoints, AForceThatFailsWhereARunGoesOnIsToldAsThat) {
   const harness::CurrentFolder current;  // of the capsules
   const ScratchFolder folder;
-  const std::string scene = folder.write("rising.gravitas", R"(
+  const std::string scene = folder.write("rising ball.gravitas", R"(
     Forces { Force { Type = "Push" Id = "Wind" CustomProperties { Push = {1, 0, 0} } } }
     Simulator { CustomProperties { TimeStep = 0.1 Duration = 2 } }
     Environment { Space { Bodies { Body { Id = "Ball" Mass = 1 PrincipalMoments = {1, 1, 1} Forces = {"Wind"}
       KineticProperties { Position = {0, -0.055, 0} LinearVelocity = {0, 0.1, 0} } } } } }
     Plugins { Plugin { Slot = "force" Library = ")" + in_build("/lib/gravitas-faulty/force_poisoned.so") +
-                                                                R"(" } })");
+                                                                     R"(" } })");
   const std::string kept = folder.path("kept"), report = folder.path("report.json");
   const auto paused = [&](std::vector<std::string> words) {
     words.insert(words.begin(), {"run", scene, "--checkpoint", kept, "--report", report});
     const ProgramResult result = run_program(words, folder);
     EXPECT_EQ(result.exit_code, 3) << result.err;
-    EXPECT_THAT(result.err, AllOf(HasSubstr("paused at step 6: slot force, plugin PoisonedForce: it failed: it never "
-                                            "was so high"),
-                                  HasSubstr("gravitas replay rising.force.step7.capsule"), Not(HasSubstr("Failures"))));
+    EXPECT_THAT(result.err,
+                AllOf(HasSubstr("paused at step 6: slot force, plugin PoisonedForce: it failed: it never "
+                                "was so high"),
+                      HasSubstr("gravitas replay 'rising ball.force.step7.capsule'"), Not(HasSubstr("Failures"))));
     EXPECT_THAT(result.out, HasSubstr("-> not known J"));
     const report::v1::Energy energy = read_report(read_file(report)).energy();
     EXPECT_DOUBLE_EQ(energy.initial(), 0.5 * 0.1 * 0.1);
