@@ -109,7 +109,7 @@ void ServedRun::begin_environment(const Resumption* from) {
   }
   event_source_.emplace(events_.get());
   reactions_.emplace("", description_, 0.0);
-  with_subscriptions([](Subscription* one) { one->source().begin_again(); });
+  with_subscriptions([&](Subscription* one) { one->source().begin_again(*environment_); });
   environment_->set_commit_listener(this);
   pair_decisions_.forget();
   if (listener_) attend_listener();
@@ -117,7 +117,8 @@ void ServedRun::begin_environment(const Resumption* from) {
   for (kernel::SwapOrder& one : begins.swaps) {
     // one of a step that was not made is still to come, and goes by who answers
     if (one.step > environment_->step_count()) continue;
-    const std::uint32_t rank = rank_of(one, orders_);
+    const auto rank = static_cast<std::uint32_t>(std::ranges::count_if(
+        orders_, [&](const Order& made) { return made.swap.slot == one.slot && made.swap.step == one.step; }));
     orders_.push_back({std::move(one), OrderKind::kSwap, ++last_order_, rank});
   }
   warnings_ = scene_warnings_;

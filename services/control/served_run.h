@@ -188,7 +188,8 @@ class ServedRun final : private kernel::CommitListener {
   api::ServedSwap swap_message(const Order& order, const std::vector<kernel::SwapRecord>& records) const;
   // With those of before the last edit.
   std::vector<Order> pending_orders() const;
-  static std::uint32_t rank_of(const kernel::SwapOrder& swap, const std::vector<Order>& orders);
+  // Of the next that is ordered there.
+  static std::uint32_t rank_of(const kernel::SwapOrder& swap, const kernel::Environment& environment);
   std::string state_name() const;
 
   void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override;

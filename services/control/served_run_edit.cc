@@ -12,6 +12,21 @@
 #include "services/run/report.h"
 
 namespace gravitas::control {
+namespace {
+
+// Those of swaps that named their path, which the catalogue does not keep.
+void add_libraries(const std::vector<recorder::v1::Decision>& decisions, Catalog* catalog) {
+  const auto add = [&](const recorder::v1::Decision& one) {
+    std::string problem;  // of who cannot be had: told where it is looked for
+    if (!one.library().empty() && !catalog->knows_library(one.library())) catalog->add_library(one.library(), &problem);
+  };
+  for (const recorder::v1::Decision& one : decisions) {
+    add(one);
+    if (one.has_before()) add(one.before());
+  }
+}
+
+}  // namespace
 
 api::EditMade ServedRun::edit(const api::EditRequest& request) {
   if (request.changes_size() == 0) throw BadInput("edit: nothing to change; allowed: changes of the scene");
@@ -28,22 +43,24 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     kernel::EnvironmentDescription begun = edited.description(), active = description_;
     for (const Slot slot : kSlots) active.slot(slot) = active_.slot(slot);
     keep_who_answers(description_, active, &begun);
-    std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
-    const auto parted = edited.hand_over(*environment_, next.get());
+    std::vector<recorder::v1::Decision> decisions = recorder_->decisions();
+    add_libraries(decisions, &catalog);
+    EditedScene::Successor successor = edited.succeed(*environment_, begun, catalog, starter(), &decisions);
+    std::unique_ptr<kernel::Environment> next = std::move(successor.environment);
     edited.look_at_limits(active, *environment_, begun, *next);
     const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next);
-    // swaps that are to come go along, the others are made
+    // swaps that are to come are ordered there, too
     std::vector<Order> pending;
     for (Order& one : pending_orders()) {
       // after it rows are those of other bodies: what is compared is counted anew
       if (one.compares()) one.swap.step = environment_->step_count() + 1;
+      one.rank = rank_of(one.swap, *next);
       try {
         next->order_swap(one.swap, one.compares());
       } catch (const std::invalid_argument& problem) {
         throw BadInput(fmt::format("edit: a swap is ordered for step {} that could not be made then: {}", one.swap.step,
                                    problem.what()));
       }
-      one.rank = rank_of(one.swap, pending);
       pending.push_back(std::move(one));
     }
     for (const kernel::FaultInjection& fault : injected_) {
@@ -60,15 +77,16 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
       events_->on_event(event);
       with_subscriptions([&](Subscription* one) { one->tell(event); });
     };
-    for (const auto& [a, b] : parted)
+    for (const auto& [a, b] : successor.parted)
       tell({EventKind::kCollisionEnd, environment_->step_count(), environment_->time(), a, b});
     std::vector<api::ServedSwap> swaps = swap_messages();
     std::erase_if(swaps, [&](const api::ServedSwap& one) {
       return std::ranges::find(pending, one.number(), &Order::number) != pending.end();
     });
-    for (api::ServedSwap& one : swaps)
-      if (one.outcome() == swap_state_name(kernel::SwapState::kProbation))
-        one.set_outcome(swap_state_name(kernel::SwapState::kCommitted));
+    for (const kernel::SwapRecord& swap : successor.settled) {
+      renew_swap(swap, &swaps, static_cast<int>(swaps.size()));
+      tell(swap_event(*environment_, swap));
+    }
     past_swaps_ = std::move(swaps);
     write_faults(*environment_, &past_);
     note_edit(edit, &past_);
@@ -76,9 +94,6 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     next_collection_ = {};
     collect_warnings();
     for (const Slot slot : kSlots) active_.slot(slot) = begun.slot(slot);
-    std::vector<recorder::v1::Decision> decisions = recorder_->decisions();
-    translate_decisions(description_, edited.description(), &decisions);
-    for (recorder::v1::Decision& decision : decisions) settle(&decision);
     recorder_->set_decisions(std::move(decisions));
     scene_ = edited.scene();
     description_ = edited.description();
@@ -90,10 +105,10 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     environment_ = std::move(next);
     environment_->set_commit_listener(this);
     if (listener_ || pair_decisions_.has_decided()) environment_->set_pair_arbiter(&pair_decisions_);
-    event_source_->begin_again();
+    event_source_->begin_again(*environment_);
     reactions_->begin_again();
     figures_->begin_again(environment_.get());
-    with_subscriptions([](Subscription* one) { one->source().begin_again(); });
+    with_subscriptions([&](Subscription* one) { one->source().begin_again(*environment_); });
     Event event{EventKind::kEdit, environment_->step_count(), environment_->time()};
     event.text = fmt::format("{} before step {}", counted(edit.changes_size(), "change"), edit.step());
     tell(event);

@@ -152,6 +152,8 @@ void ServedRun::write_plan(api::Plan* plan) const {
 std::vector<api::ServedSwap> ServedRun::swap_messages() const {
   std::vector<api::ServedSwap> swaps = past_swaps_;
   const std::vector<kernel::SwapRecord> records = environment_->swaps();
+  for (const kernel::SwapRecord& record : records)
+    if (!record.only_compared) renew_swap(record, &swaps, static_cast<int>(swaps.size()));
   for (const Order& order : orders_) swaps.push_back(swap_message(order, records));
   return swaps;
 }

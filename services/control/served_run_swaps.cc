@@ -147,9 +147,10 @@ const kernel::SwapRecord& ServedRun::record_of(const Order& order, const std::ve
   throw std::logic_error("a swap that was ordered is not known");
 }
 
-std::uint32_t ServedRun::rank_of(const kernel::SwapOrder& swap, const std::vector<Order>& orders) {
-  return static_cast<std::uint32_t>(std::ranges::count_if(
-      orders, [&](const Order& one) { return one.swap.slot == swap.slot && one.swap.step == swap.step; }));
+std::uint32_t ServedRun::rank_of(const kernel::SwapOrder& swap, const kernel::Environment& environment) {
+  return static_cast<std::uint32_t>(std::ranges::count_if(environment.swaps(), [&](const kernel::SwapRecord& one) {
+    return one.slot == swap.slot && one.step == swap.step;
+  }));
 }
 
 std::vector<ServedRun::Order> ServedRun::pending_orders() const {
@@ -162,10 +163,7 @@ std::vector<ServedRun::Order> ServedRun::pending_orders() const {
 
 api::SwapOrdered ServedRun::order(kernel::SwapOrder order, OrderKind kind) {
   // after those of a checkpoint for that step, which are no orders of here
-  const auto rank =
-      static_cast<std::uint32_t>(std::ranges::count_if(environment_->swaps(), [&](const kernel::SwapRecord& one) {
-        return one.slot == order.slot && one.step == order.step;
-      }));
+  const std::uint32_t rank = rank_of(order, *environment_);
   try {
     environment_->order_swap(order, kind == OrderKind::kComparison);
   } catch (const std::invalid_argument& problem) {

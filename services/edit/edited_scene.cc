@@ -9,7 +9,6 @@
 
 #include "plugin_sdk/checks.h"
 #include "plugin_sdk/motion_curve.h"
-#include "plugin_sdk/slots.h"
 #include "services/edit/disturbance.h"
 #include "services/edit/turned_joints.h"
 
@@ -110,6 +109,8 @@ void EditedScene::read_changes(const RunOptions& options, Catalog* catalog) {
     throw BadInput(named(scene::to_string(problems.errors.at(0))));
   try {
     description_ = build_scene(options, scene_, catalog, &warnings_);
+    // a library of a swap may have their names
+    keep_who_answers(before_, before_, &description_);
   } catch (const BadInput& problem) {
     throw BadInput(named(problem.what()));
   }
@@ -320,16 +321,6 @@ std::vector<std::uint32_t> new_rows(const std::vector<std::uint32_t>& old_row, s
   return rows;
 }
 
-// Of a slot's plugin, by its name; kNone if it is gone.
-std::uint32_t row_after(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& next,
-                        Slot slot, std::uint32_t row) {
-  const std::string& name = before.slot(slot).plugins.at(row).declaration.name;
-  const std::vector<kernel::PluginChoice>& plugins = next.slot(slot).plugins;
-  for (std::uint32_t i = 0; i < plugins.size(); ++i)
-    if (plugins[i].declaration.name == name) return i;
-  return kNone;
-}
-
 void translate(const std::vector<std::uint32_t>& rows, Numbers* numbers) {
   for (std::uint32_t& row : std::get<std::vector<std::uint32_t>>(*numbers)) row = rows[row];
 }
@@ -476,31 +467,6 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
   for (std::size_t i = 0; i < touched.size() / 2; ++i)
     if (!std::ranges::binary_search(touching, i)) parted.push_back({touched[2 * i], touched[2 * i + 1]});
   return parted;
-}
-
-void keep_who_answers(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& active,
-                      kernel::EnvironmentDescription* next) {
-  for (const Slot slot : kSlots) {
-    const std::vector<kernel::PluginChoice>& scenes = before.slot(slot).plugins;
-    for (kernel::PluginChoice& plugin : next->slot(slot).plugins) {
-      const auto same = std::ranges::find_if(
-          scenes, [&](const kernel::PluginChoice& one) { return one.declaration.name == plugin.declaration.name; });
-      if (same == scenes.end()) continue;
-      const auto fallback = plugin.fallback;
-      plugin = active.slot(slot).plugins.at(static_cast<std::size_t>(same - scenes.begin()));
-      // who took over has none
-      if (plugin.fallback) plugin.fallback = fallback;
-    }
-    if (!scenes.empty()) next->slot(slot).hosting = active.slot(slot).hosting;
-  }
-}
-
-void translate_decisions(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& next,
-                         std::vector<recorder::v1::Decision>* decisions) {
-  std::erase_if(*decisions, [&](recorder::v1::Decision& decision) {
-    decision.set_target(row_after(before, next, *find_slot(decision.slot()), decision.target()));
-    return decision.target() == kNone;
-  });
 }
 
 }  // namespace gravitas

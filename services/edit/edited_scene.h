@@ -2,8 +2,8 @@
 // takes over the state at a step boundary.
 //
 //   EditedScene next(options, scene, before, catalog, &edit, &now);      throws BadInput, and nothing has changed
-//   auto environment = next.start(next.description());                   new processes; throws BadInput
-//   next.hand_over(now, environment.get());                              the state, its hash chain with the edit in it
+//   Successor successor = next.succeed(now, …);                          new processes; throws BadInput. The state, its hash
+//                                                                        chain with the edit in it, and swaps that were made
 //
 // A body, joint, force … that keeps its id goes on: a body where it is and as fast as it is, but for what the edit sets
 // of Position, Orientation (of its geometry's frame), LinearVelocity (of its centre of mass) and AngularVelocity; a joint
@@ -47,19 +47,32 @@ class EditedScene {
   void look_at_limits(const kernel::EnvironmentDescription& active, const kernel::Environment& now,
                       const kernel::EnvironmentDescription& begun, const kernel::Environment& next);
 
-  // Starts the environment of description(), whoever answers there. Throws BadInput that names the edit.
-  std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& begun,
-                                             const kernel::HostStarter& starter = kernel::start_host) const;
+  struct Successor {
+    std::unique_ptr<kernel::Environment> environment;
+    std::vector<std::array<std::uint32_t, 2>> parted;  // bodies (rows of before) whose collision ends with the edit
+    std::vector<kernel::SwapRecord> settled;           // swaps whose probation ends with it, and why
+  };
+  // The environment in which `now` goes on. `answering`: who answers in it. Swaps among the `decisions` in force, which become
+  // those of description(), are made again there, as where a run is resumed: it knows then what a failure goes back to.
+  // Where they cannot be, they are settled, and warned of. Throws BadInput that names the edit; std::logic_error if the
+  // state is not taken.
+  Successor succeed(const kernel::Environment& now, const kernel::EnvironmentDescription& answering,
+                    const Catalog& catalog, const kernel::HostStarter& starter,
+                    std::vector<recorder::v1::Decision>* decisions);
 
   // Bodies that slept in `now` and are awake in `next`, which has the state.
   std::vector<std::uint32_t> woken(const kernel::Environment& now, const kernel::Environment& next) const;
 
-  // Returns the pairs of bodies (rows of before) whose collision ends with the edit. Precondition: `next` runs
-  // description(), whoever answers there. Throws std::logic_error if it does not take the state.
-  std::vector<std::array<std::uint32_t, 2>> hand_over(const kernel::Environment& now, kernel::Environment* next) const;
-
  private:
   std::string named(const std::string& problem) const;
+  std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& begun,
+                                             const kernel::HostStarter& starter) const;
+  // With the swaps made again.
+  Successor succeed_with_swaps(const kernel::Environment& now, const kernel::EnvironmentDescription& answering,
+                               const Catalog& catalog, const kernel::HostStarter& starter,
+                               std::vector<recorder::v1::Decision>* decisions) const;
+  // Returns the pairs that part.
+  std::vector<std::array<std::uint32_t, 2>> hand_over(const kernel::Environment& now, kernel::Environment* next) const;
   void read_changes(const RunOptions& options, Catalog* catalog);
   void find_kept();
   void keep_stopped();
@@ -91,8 +104,8 @@ class EditedScene {
 void keep_who_answers(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& active,
                       kernel::EnvironmentDescription* next);
 
-// Rows of who answers, in the slots of an edited scene; who served what is gone goes, too.
-void translate_decisions(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& next,
-                         std::vector<recorder::v1::Decision>* decisions);
+// Row of a slot's plugin after an edit, by its name; kNone if it is gone.
+std::uint32_t row_after(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& next,
+                        Slot slot, std::uint32_t row);
 
 }  // namespace gravitas

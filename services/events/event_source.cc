@@ -62,6 +62,15 @@ double passed_side(const Discrepancy& limit, int axis, const JointBody& body1, c
 
 }  // namespace
 
+Event swap_event(const kernel::Environment& environment, const kernel::SwapRecord& swap) {
+  Event event{EventKind::kSwap, environment.step_count(), environment.time()};
+  event.slot = slot_name(swap.slot);
+  event.plugin = swap.to;
+  event.what = swap_state_name(swap.state);
+  event.text = swap.reason;
+  return event;
+}
+
 // visit(record) for every swap that has got further.
 template <typename Visit>
 void EventSource::visit_swaps(const kernel::Environment& environment, Visit&& visit) {
@@ -75,11 +84,12 @@ void EventSource::visit_swaps(const kernel::Environment& environment, Visit&& vi
   }
 }
 
-void EventSource::begin_again() {
+void EventSource::begin_again(const kernel::Environment& environment) {
   events_.clear();
   ongoing_.clear();
   faults_ = 0;
   swaps_.clear();
+  leave_out_swaps(environment);
 }
 
 void EventSource::leave_out_past(const kernel::Environment& environment) {
@@ -238,14 +248,8 @@ void EventSource::find_faults(const kernel::Environment& environment) {
 }
 
 void EventSource::find_swaps(const kernel::Environment& environment) {
-  visit_swaps(environment, [&](const kernel::SwapRecord& record) {
-    Event event{EventKind::kSwap, environment.step_count(), environment.time()};
-    event.slot = slot_name(record.slot);
-    event.plugin = record.to;
-    event.what = swap_state_name(record.state);
-    event.text = record.reason;
-    listener_.on_event(event);
-  });
+  visit_swaps(environment,
+              [&](const kernel::SwapRecord& record) { listener_.on_event(swap_event(environment, record)); });
 }
 
 }  // namespace gravitas

@@ -18,6 +18,9 @@ namespace gravitas {
 
 inline constexpr double kOngoingRate = 10.0;  // Hz (§ 3.6.2)
 
+// How a swap stands.
+Event swap_event(const kernel::Environment& environment, const kernel::SwapRecord& swap);
+
 class EventSource final : public kernel::CommitListener {
  public:
   // `ongoing_rate`, Hz: how often collisions that go on are told: at the first commit at or after k / rate.
@@ -27,8 +30,8 @@ class EventSource final : public kernel::CommitListener {
 
   EventKinds kinds() const { return kinds_; }
 
-  // Another environment takes the place of the one before.
-  void begin_again();
+  // This environment takes the place of the one before. Swaps that it has made were told.
+  void begin_again(const kernel::Environment& environment);
   // Faults and swaps so far are not told.
   void leave_out_past(const kernel::Environment& environment);
   // Those alone that were made already: of a run that is resumed, before its checkpoint.

@@ -39,9 +39,11 @@ recorder::v1::Decision message_of(const kernel::Decision& decision) {
   return message;
 }
 
-void settle(recorder::v1::Decision* decision) {
+bool settle(recorder::v1::Decision* decision) {
   decision->clear_before();
-  if (is_swap(*decision)) decision->set_why("settled swap");
+  const bool was_swap = is_swap(*decision);
+  if (was_swap) decision->set_why("settled swap");
+  return was_swap;
 }
 
 void put_in_force(const recorder::v1::Decision& decision, std::vector<recorder::v1::Decision>* in_force) {

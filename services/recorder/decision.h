@@ -13,8 +13,8 @@ namespace gravitas {
 
 recorder::v1::Decision message_of(const kernel::Decision& decision);
 
-// Makes of it one that is not.
-void settle(recorder::v1::Decision* decision);
+// A swap becomes one that is not taken back any more; false if it was none.
+bool settle(recorder::v1::Decision* decision);
 
 // The last decision about a plugin's place is the one in force; a swap knows the one before.
 void put_in_force(const recorder::v1::Decision& decision, std::vector<recorder::v1::Decision>* in_force);

@@ -179,7 +179,7 @@ void write_swaps(const kernel::Environment& environment, report::v1::Report* rep
   const int known = report->swaps_size();
   for (const kernel::SwapRecord& one : environment.swaps()) {
     if (report::v1::SwapRecord* before = one.only_compared ? nullptr : find_swap(one, known, report)) {
-      if (before->outcome() != swap_state_name(kernel::SwapState::kProbation)) continue;
+      if (!is_in_place(*before) || before->outcome() == swap_state_name(one.state)) continue;
       before->set_outcome(swap_state_name(one.state));
       before->set_reason(one.reason);
       continue;
@@ -252,12 +252,6 @@ void fold_warnings(report::v1::Report* report) {
     if (const int all = std::exchange(times[warning], 0); all > 0)
       folded.add_warnings(all > 1 ? fmt::format("{} ({} times)", warning, all) : warning);
   report->mutable_warnings()->Swap(folded.mutable_warnings());
-}
-
-void settle_swaps(report::v1::Report* report) {
-  for (report::v1::SwapRecord& swap : *report->mutable_swaps())
-    if (swap.outcome() == swap_state_name(kernel::SwapState::kProbation))
-      swap.set_outcome(swap_state_name(kernel::SwapState::kCommitted));
 }
 
 }  // namespace gravitas

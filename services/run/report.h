@@ -7,6 +7,8 @@
 #include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
+#include "plugin_sdk/slots.h"
+#include "services/run/kernel_names.h"
 
 namespace gravitas {
 
@@ -18,7 +20,7 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
 void write_stages(const kernel::Environment& environment, report::v1::Report* report);
 // With a warning where another plugin answers since.
 void write_faults(const kernel::Environment& environment, report::v1::Report* report);
-// One that the report has is made again where a run goes on, and has its outcome there if it was on probation.
+// Those that the report has, and that were made again where a run goes on or after an edit, are renewed: how they stand.
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report);
 // With those of before: what a checkpoint keeps of them.
 void write_swaps(const kernel::Environment& environment, const report::v1::Report& before, recorder::v1::Tally* tally);
@@ -48,7 +50,25 @@ std::string pause_text(const kernel::EnvironmentDescription& description, const 
 // Warnings that are alike become the first of them, with their count: "… (275 times)".
 void fold_warnings(report::v1::Report* report);
 
-// The environment whose swaps have been written is replaced by another: probation has passed.
-void settle_swaps(report::v1::Report* report);
+// True of one that was made and not taken back.
+template <typename Message>
+bool is_in_place(const Message& swap) {
+  return swap.outcome() == swap_state_name(kernel::SwapState::kProbation) ||
+         swap.outcome() == swap_state_name(kernel::SwapState::kCommitted);
+}
+
+// How a swap stands now, in the last of these messages that is of it; false if none is.
+template <typename Messages>
+bool renew_swap(const kernel::SwapRecord& record, Messages* messages, int count) {
+  for (int i = count; i-- > 0;) {
+    auto& one = (*messages)[i];
+    if (!is_in_place(one) || one.slot() != slot_name(record.slot) || one.step() != record.step || one.to() != record.to)
+      continue;
+    one.set_outcome(swap_state_name(record.state));
+    one.set_reason(record.reason);
+    return true;
+  }
+  return false;
+}
 
 }  // namespace gravitas

@@ -334,26 +334,27 @@ class Run final : private kernel::CommitListener {
     kernel::EnvironmentDescription active = description_, begun = edited.description();
     put_in_place(decisions_, catalog_, &active);
     keep_who_answers(description_, active, &begun);
-    std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
-    const auto parted = edited.hand_over(*environment_, next.get());
-    edited.look_at_limits(active, *environment_, begun, *next);
-    const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next);
+    std::vector<recorder::v1::Decision> decisions = decisions_;
+    EditedScene::Successor next = edited.succeed(*environment_, begun, catalog_, starter(), &decisions);
+    edited.look_at_limits(active, *environment_, begun, *next.environment);
+    const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next.environment);
     for (const std::string& warning : edited.warnings())
       if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
-    for (const auto& [a, b] : parted)
+    for (const auto& [a, b] : next.parted)
       tell({EventKind::kCollisionEnd, environment_->step_count(), environment_->time(), a, b}, "");
     write_past();
-    settle_swaps(&result_.report);
-    translate_decisions(description_, edited.description(), &decisions_);
-    // another environment: nothing is on probation there
-    for (recorder::v1::Decision& decision : decisions_) settle(&decision);
+    for (const kernel::SwapRecord& swap : next.settled) {
+      renew_swap(swap, result_.report.mutable_swaps(), result_.report.swaps_size());
+      tell(swap_event(*environment_, swap), swap.reason);
+    }
+    decisions_ = std::move(decisions);
     take(edited);
-    if (pair_decisions_) pair_decisions_->follow(environment_->model(), next->model());
-    environment_ = std::move(next);
+    if (pair_decisions_) pair_decisions_->follow(environment_->model(), next.environment->model());
+    environment_ = std::move(next.environment);
     edits_.note(*edit);
     note_edit(*edit, &result_.report);
     if (recorder_) recorder_->set_decisions(decisions_);
-    if (event_source_) event_source_->begin_again();
+    if (event_source_) event_source_->begin_again(*environment_);
     if (trajectory_) trajectory_->follow(description_);
     if (reactions_) reactions_->begin_again();
     if (survey_) survey_->begin_again(begun);

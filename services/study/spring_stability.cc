@@ -253,8 +253,8 @@ double amplification_in_theory(const std::string& method, const SpringCell& cell
 }
 
 double stability_limit(const std::string& method, double zeta) {
-  constexpr double kFinest = 1e-4, kLargest = 1e12, kRounding = 1e-11;
-  const auto is_stable = [&](double k) { return amplification_in_theory(method, {k, zeta}) <= 1.0 + kRounding; };
+  constexpr double kFinest = 1e-4, kLargest = 1e12, kSlack = 1e-11;
+  const auto is_stable = [&](double k) { return amplification_in_theory(method, {k, zeta}) <= 1.0 + kSlack; };
   double low = kFinest;
   if (!is_stable(low)) return 0.0;
   while (low < kLargest && is_stable(1.02 * low)) low *= 1.02;

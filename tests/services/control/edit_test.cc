@@ -4,12 +4,17 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <chrono>
+#include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "services/control/status_text.h"
 #include "services/run/edit_spec.h"
 #include "services/run/summary.h"
+#include "tests/paths.h"
 #include "tests/run_quietly.h"
 #include "tests/services/control/served.h"
 
@@ -72,7 +77,7 @@ TEST(ServedEdit, HasTheChainOfARunWithTheSameEdits) {
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
 }
 
-// One on probation is made; one of a later step goes on waiting, under its number, whatever is edited or set before it.
+// One on probation stays so; one of a later step goes on waiting, under its number, whatever is edited or set before it.
 TEST(ServedEdit, SwapsThatAreToComeGoAlong) {
   Served served(harness::sample("direct"));
   const std::string move = "set Body.Ball01.LinearVelocity={0,1,0}", push = "set Body.Ball01.LinearVelocity={1,0,0}";
@@ -101,16 +106,46 @@ TEST(ServedEdit, SwapsThatAreToComeGoAlong) {
   served.client.step(20);
   EXPECT_EQ(solver().plugin(), "Newton");
   edit(&served, {move});  // in its probation
-  std::map<std::uint32_t, std::string> ends;
-  const api::Status status = served.client.status();
-  for (const api::ServedSwap& swap : status.swaps())
-    ends[swap.number()] = fmt::format("{} -> {} {} {}", swap.from(), swap.to(), swap.step(), swap.outcome());
-  EXPECT_EQ(ends[newton.number()], "Sequential -> Newton 40 committed");
-  EXPECT_EQ(ends[set.number()], "Sequential -> Sequential 13 committed");
+  const auto ends = [&] {
+    std::map<std::uint32_t, std::string> ends;
+    const api::Status status = served.client.status();
+    EXPECT_EQ(status.swaps_size(), 2);
+    for (const api::ServedSwap& swap : status.swaps())
+      ends[swap.number()] = fmt::format("{} -> {} {} {}", swap.from(), swap.to(), swap.step(), swap.outcome());
+    return ends;
+  };
+  EXPECT_EQ(ends()[newton.number()], "Sequential -> Newton 40 probation");
+  EXPECT_EQ(ends()[set.number()], "Sequential -> Sequential 13 committed");
   RunOptions options = harness::sample("direct").run;
   options.edits = {move + "@step=11", push + "@step=23", move + "@step=43"};
   options.swaps = {"solver=Newton@step=40"};
   EXPECT_EQ(served.to_the_end().chain_hash(), run_quietly(options).report.chain_hash());
+  EXPECT_EQ(ends()[newton.number()], "Sequential -> Newton 40 committed");
+}
+
+// The catalogue of the run does not know the library.
+TEST(ServedEdit, ASwapOnProbationIsTakenBack) {
+  Served served(harness::sample("shm"));
+  const std::string copy = served.folder.path("newton_copy.so");
+  std::filesystem::copy(in_build("/lib/gravitas/solver_newton.so"), copy);
+  served.client.step(10);
+  served.client.swap(parse_swap_request("solver=" + copy + "@step=12"));
+  api::EventsRequest request;
+  request.add_kinds("swap");
+  const std::shared_ptr<Subscription> events = served.run.subscribe(request);
+  served.client.step(3);
+  edit(&served, {"set Body.Ball01.LinearVelocity={0,1,0}"});
+  served.client.step(1);
+  edit(&served, {"set Body.Ball01.LinearVelocity={1,0,0}"});
+  served.client.inject("solver:kill@step=16");
+  served.client.step(5);
+  const api::Status status = served.client.status();
+  ASSERT_EQ(status.swaps_size(), 1);
+  EXPECT_EQ(status.swaps(0).outcome(), "rolled back");
+  EXPECT_EQ(status.fault_count(), 1U);
+  std::vector<std::string> told;
+  while (const auto event = events->next(std::chrono::milliseconds(0))) told.push_back(event->incident().what());
+  EXPECT_THAT(told, ::testing::ElementsAre("probation", "rolled back"));
 }
 
 // It stays broken, and says so.

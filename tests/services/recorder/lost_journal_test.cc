@@ -15,6 +15,7 @@
 #include "services/run/session.h"
 #include "tests/paths.h"
 #include "tests/run_quietly.h"
+#include "tests/services/cli/program.h"
 
 namespace gravitas {
 namespace {
