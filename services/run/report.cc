@@ -175,9 +175,15 @@ std::string disagreement_text(const report::v1::Disagreement& disagreement) {
   return one.quantity() + ": " + apart;
 }
 
-void write_swaps(const kernel::Environment& environment, report::v1::Report* report) {
+void write_swaps(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
+                 report::v1::Report* report) {
   const int known = report->swaps_size();
   for (const kernel::SwapRecord& one : environment.swaps()) {
+    const auto is_it = [&](const recorder::v1::Decision& decision) {
+      return decision.step() == one.step && decision.slot() == slot_name(one.slot) &&
+             decision.plugin() == plugin_of(one.to);
+    };
+    if (!one.only_compared && std::ranges::any_of(taken_over, is_it)) continue;
     if (report::v1::SwapRecord* before = one.only_compared ? nullptr : find_swap(one, known, report)) {
       if (!is_in_place(*before) || before->outcome() == swap_state_name(one.state)) continue;
       before->set_outcome(swap_state_name(one.state));
@@ -198,10 +204,11 @@ void write_swaps(const kernel::Environment& environment, report::v1::Report* rep
   std::ranges::stable_sort(*report->mutable_comparisons(), {}, &report::v1::SwapRecord::step);
 }
 
-void write_swaps(const kernel::Environment& environment, const report::v1::Report& before, recorder::v1::Tally* tally) {
+void write_swaps(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
+                 const report::v1::Report& before, recorder::v1::Tally* tally) {
   report::v1::Report all;
   *all.mutable_swaps() = before.swaps();
-  write_swaps(environment, &all);
+  write_swaps(environment, taken_over, &all);
   tally->clear_swaps();
   for (report::v1::SwapRecord& swap : *all.mutable_swaps()) {
     // those of later steps are ordered again

@@ -1,6 +1,7 @@
 // What the report of a run takes from its environment.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "gravitas/edit/v1/edit.pb.h"
@@ -20,10 +21,13 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
 void write_stages(const kernel::Environment& environment, report::v1::Report* report);
 // With a warning where another plugin answers since.
 void write_faults(const kernel::Environment& environment, report::v1::Report* report);
-// Those that the report has, and that were made again where a run goes on or after an edit, are renewed: how they stand.
-void write_swaps(const kernel::Environment& environment, report::v1::Report* report);
+// Those that the report has, and that were made again where a run goes on or after an edit, are renewed: how they stand. None is
+// what was `taken_over`, in the step that a decision tells (resumption.h).
+void write_swaps(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
+                 report::v1::Report* report);
 // With those of before: what a checkpoint keeps of them.
-void write_swaps(const kernel::Environment& environment, const report::v1::Report& before, recorder::v1::Tally* tally);
+void write_swaps(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
+                 const report::v1::Report& before, recorder::v1::Tally* tally);
 void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to);
 void note_edit(const edit::v1::Edit& edit, report::v1::Report* report);
 

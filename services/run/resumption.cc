@@ -142,6 +142,21 @@ void warn_of_unknown_swaps(std::span<const kernel::SwapOrder> orders, const reco
   }
 }
 
+void note_takeover(const recorder::v1::Decision& decision, std::vector<recorder::v1::Decision>* taken_over,
+                   std::vector<std::string>* warnings) {
+  taken_over->push_back(decision);
+  warnings->push_back(fmt::format("from step {} on slot {} is answered by {}, as the journal has it ({})",
+                                  decision.step(), decision.slot(), decision.plugin(), decision.why()));
+}
+
+kernel::Decision as_first_decided(kernel::Decision decision, std::span<const recorder::v1::Decision> taken_over) {
+  for (const recorder::v1::Decision& one : taken_over)
+    if (decision.why == "swap" && one.step() == decision.step && one.slot() == slot_name(decision.slot) &&
+        one.plugin() == decision.plugin->declaration.name)
+      decision.why = one.why();
+  return decision;
+}
+
 void restore(recorder::v1::Checkpoint* checkpoint, const kernel::EnvironmentDescription& now, const Catalog& catalog,
              kernel::Environment* environment) {
   const std::vector<recorder::v1::Decision> decisions(checkpoint->decisions().begin(), checkpoint->decisions().end());

@@ -37,6 +37,12 @@ Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel:
 void warn_of_unknown_swaps(std::span<const kernel::SwapOrder> orders, const recorder::v1::Checkpoint& checkpoint,
                            std::vector<std::string>* warnings);
 
+// Who took over in a step that the journal knows takes over there by an order, which is told as no swap.
+void note_takeover(const recorder::v1::Decision& decision, std::vector<recorder::v1::Decision>* taken_over,
+                   std::vector<std::string>* warnings);
+// With the reason of the first time.
+kernel::Decision as_first_decided(kernel::Decision decision, std::span<const recorder::v1::Decision> taken_over);
+
 // Makes the swaps again in an environment that has begun so, and restores its state. Throws std::runtime_error.
 void restore(recorder::v1::Checkpoint* checkpoint, const kernel::EnvironmentDescription& now, const Catalog& catalog,
              kernel::Environment* environment);

@@ -288,7 +288,9 @@ class Run final : private kernel::CommitListener {
                  one.plugin.declaration.name == order.plugin.declaration.name &&
                  have_same_settings(one.plugin, order.plugin);
         });
-        if (!is_ordered && !is_restored(order)) swaps_.push_back(std::move(order));
+        if (is_ordered || is_restored(order)) continue;
+        if (decision.why() != "swap") note_takeover(decision, &taken_over_, &warnings_);
+        swaps_.push_back(std::move(order));
       }
     });
     // how far hosting may differ is for the command line to say
@@ -424,7 +426,8 @@ class Run final : private kernel::CommitListener {
     if (event_source_) event_source_->on_commit(environment);
     if (recorder_) recorder_->on_commit(environment);
   }
-  void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override {
+  void on_decision(const kernel::Environment& environment, const kernel::Decision& told) override {
+    const kernel::Decision decision = as_first_decided(told, taken_over_);
     put_in_force(message_of(decision), &decisions_);
     if (survey_) survey_->follow(decision);
     if (recorder_) recorder_->on_decision(environment, decision);
@@ -482,7 +485,7 @@ class Run final : private kernel::CommitListener {
   recorder::v1::Tally tally() const {
     recorder::v1::Tally tally = resumed_tally_;
     figures_->write(&tally);
-    write_swaps(*environment_, result_.report, &tally);
+    write_swaps(*environment_, taken_over_, result_.report, &tally);
     if (events_) events_->write(&tally);
     return tally;
   }
@@ -526,7 +529,7 @@ class Run final : private kernel::CommitListener {
   std::vector<kernel::SwapOrder> swaps_, comparisons_;
   std::vector<kernel::FaultInjection> faults_;
   std::vector<RerunSpec> reruns_;
-  std::vector<recorder::v1::Decision> decisions_;  // in force
+  std::vector<recorder::v1::Decision> decisions_, taken_over_;  // in force; in the journal, and no swaps
   std::optional<PairDecisions> pair_decisions_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
@@ -550,7 +553,7 @@ class Run final : private kernel::CommitListener {
 void Run::write_past() {
   for (std::string& warning : environment_->warnings()) warnings_.push_back(std::move(warning));
   write_faults(*environment_, &result_.report);
-  write_swaps(*environment_, &result_.report);
+  write_swaps(*environment_, taken_over_, &result_.report);
 }
 
 void Run::write_report() {

@@ -1,8 +1,12 @@
 // Failures of a slot that a run had before it stopped count where it goes on, as if it had not stopped.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <string>
+#include <vector>
 
+#include "services/recorder/durable_file.h"
 #include "services/run/session.h"
 #include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
@@ -50,6 +54,41 @@ TEST(ResumedRun, CountsTheFailuresOfBefore) {
     const RunResult other = run_quietly(edited);
     ASSERT_EQ(other.report.faults_size(), 3);
     EXPECT_EQ(other.report.faults(2).recovered_by() == "fallback Newton", last == 44);
+  }
+}
+
+// A fallback that the journal knows takes over where it did, and is no swap, however often the run goes on from there.
+TEST(ResumedRun, AFallbackOfTheJournalIsNoSwap) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write(
+      "scene.gravitas", harness::read_file(harness::shipped_scene("two_spheres_motor")) +
+                            "Plugins { Plugin { Slot = \"solver\" Fallback = \"Newton\" Failures = 1 } }\n");
+  RunOptions part = in_workers(scene, 80);
+  part.steps = 30;
+  part.checkpoint = folder.path("checkpoint");
+  ASSERT_EQ(run_quietly(part).outcome, RunOutcome::kCompleted);
+  const std::vector<std::byte> early = read_whole_file(part.checkpoint);
+  part.steps = 60;
+  part.resume = part.checkpoint;
+  part.faults = {"solver:kill@step=40"};
+  ASSERT_EQ(run_quietly(part).outcome, RunOutcome::kCompleted);
+  RunOptions whole = in_workers(scene, 80);
+  whole.faults = part.faults;
+  const RunResult expected = run_quietly(whole);
+  // as if it had been killed after step 60; the worker does not die again
+  replace_file(part.checkpoint, early);
+  RunOptions rest = part;
+  rest.faults.clear();
+  for (const std::uint32_t steps : {70U, 80U}) {
+    rest.steps = steps;
+    const RunResult resumed = run_quietly(rest);
+    ASSERT_EQ(resumed.outcome, RunOutcome::kCompleted) << resumed.fault;
+    EXPECT_EQ(resumed.report.swaps_size(), 0) << steps;
+    if (steps == 80) EXPECT_EQ(resumed.report.chain_hash(), expected.report.chain_hash());
+    if (steps == 70)
+      EXPECT_THAT(resumed.report.warnings(),
+                  ::testing::Contains(
+                      "from step 40 on slot solver is answered by Newton, as the journal has it (fallback Newton)"));
   }
 }
 
