@@ -458,7 +458,7 @@ void ServedRun::on_commit(const kernel::Environment& environment) {
 void ServedRun::on_decision(const kernel::Environment& environment, const kernel::Decision& decision) {
   kernel::SlotDescription& slot = active_.slot(decision.slot);
   slot.plugins.at(decision.target) = *decision.plugin;
-  if (decision.target == 0 && slot.is_hosted_as(*decision.plugin)) slot.hosting = decision.host->hosting;
+  if (slot.is_hosted_as(*decision.plugin)) slot.hosting = decision.host->hosting;
   if (survey_) survey_->surveyor.follow(decision);
   // last: it throws where a disk is full
   recorder_->on_decision(environment, decision);
