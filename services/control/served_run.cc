@@ -134,6 +134,7 @@ void ServedRun::begin_environment(const Resumption* from) {
       one.step = environment_->step_count() + 1;
       order(std::move(one), OrderKind::kComparison);
     }
+    if (from != nullptr) order_again(*from);
   }
   status_now();
   if (!options_.checkpoint.empty()) keep_checkpoint(from != nullptr ? from->journal : JournalReading{});

@@ -150,6 +150,8 @@ class ServedRun final : private kernel::CommitListener {
   // With null the scene begins.
   void begin_environment(const Resumption* from);
   Beginning restored(const Resumption& from);
+  // What was ordered for steps that are still to come.
+  void order_again(const Resumption& from);
   static Resumption last_known(const RunOptions& options, const kernel::EnvironmentDescription& description,
                                std::vector<std::string>* warnings);
   static kernel::EnvironmentDescription slots_of(const kernel::EnvironmentDescription& whole);
@@ -167,6 +169,8 @@ class ServedRun final : private kernel::CommitListener {
   void require_steps_left(const std::string& what) const;
   std::uint32_t next_step(const std::string& what, std::uint32_t wanted) const;
   api::SwapOrdered order(kernel::SwapOrder order, OrderKind kind);
+  // In the journal, but for comparisons: ordered, or called off.
+  void note(const Order& order, bool is_called_off);
   const kernel::PluginChoice& choice_with(const std::string& what, Slot slot, const std::string& property,
                                           const std::vector<kernel::SwapRecord>& records) const;
   // Precondition: of this order, among records of all swaps.

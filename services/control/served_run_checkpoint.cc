@@ -77,13 +77,28 @@ ServedRun::Beginning ServedRun::restored(const Resumption& from) {
   return begins;
 }
 
+void ServedRun::order_again(const Resumption& from) {
+  std::vector<std::string> warnings;
+  for (LiveOrder& one : orders_to_come(from, catalog_, &warnings)) {
+    const std::uint32_t step = one.swap.step;
+    if (step <= environment_->step_count() || step > environment_->total_steps()) continue;
+    try {
+      order(std::move(one.swap), one.is_setting ? OrderKind::kSetting : OrderKind::kSwap);
+    } catch (const BadInput& problem) {
+      warnings.push_back(
+          fmt::format("the swap that was ordered for step {} is not ordered again: {}", step, problem.what()));
+    }
+  }
+  for (const std::string& warning : warnings) add_warning(warning);
+}
+
 // Begins it; a reset begins it anew.
 void ServedRun::keep_checkpoint(const JournalReading& known) {
   try {
     const std::string path = checkpoint_target(options_.checkpoint);
     // the journal of another file starts anew
     recorder_->keep(std::filesystem::absolute(path), options_.checkpoint_every,
-                    goes_on_in_its_checkpoint(options_) ? known : JournalReading{}, *environment_);
+                    goes_on_in_its_checkpoint(options_) ? known : known.anew(), *environment_);
   } catch (const std::runtime_error& problem) {
     throw BadInput(problem.what());
   }
@@ -148,6 +163,7 @@ std::string ServedRun::command_to_resume() {
   for (const Order& one : pending_orders()) {
     const auto& [slot, plugin, hosting, step] = one.swap;
     if (one.kind == OrderKind::kSetting) {
+      if (recorder_->keeps()) continue;  // the journal has it
       add_warning(fmt::format("what was set of {} for step {} is not part of the command that goes on",
                               plugin.declaration.name, step));
       continue;

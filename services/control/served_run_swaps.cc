@@ -9,6 +9,7 @@
 #include "plugin_sdk/property_value.h"
 #include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
+#include "services/recorder/decision.h"
 #include "services/run/exchange_spec.h"
 #include "services/scene/parser.h"
 
@@ -75,8 +76,10 @@ api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
 api::ServedSwap ServedRun::call_off(const api::CallOffRequest& request) {
   return between_steps([&] {
     const auto found = std::ranges::find(orders_, request.number(), &Order::number);
-    if (found != orders_.end() && environment_->call_off_swap(found->swap.slot, found->swap.step, found->rank))
+    if (found != orders_.end() && environment_->call_off_swap(found->swap.slot, found->swap.step, found->rank)) {
+      note(*found, true);
       return swap_message(*found, environment_->swaps());
+    }
     std::vector<std::uint32_t> pending;
     for (const Order& one : pending_orders()) pending.push_back(one.number);
     const std::string what = fmt::format("call-off {}: ", request.number());
@@ -173,7 +176,20 @@ api::SwapOrdered ServedRun::order(kernel::SwapOrder order, OrderKind kind) {
   ordered.set_number(++last_order_);
   ordered.set_step(order.step);
   orders_.push_back({std::move(order), kind, last_order_, rank});
+  note(orders_.back(), false);
   return ordered;
+}
+
+void ServedRun::note(const Order& order, bool is_called_off) {
+  if (order.compares()) return;
+  const char* why = is_called_off ? kCalledOff : order.kind == OrderKind::kSetting ? kOrderOfSetting : kOrderOfSwap;
+  try {
+    recorder_->note_order(message_of(order.swap, why));
+  } catch (const std::system_error& problem) {
+    // a disk may be full
+    fault_ = problem.what();
+    keep_faulted_state();
+  }
 }
 
 }  // namespace gravitas::control

@@ -25,17 +25,23 @@ std::optional<kernel::Hosting> find_hosting(const std::string& name) {
 }  // namespace
 
 recorder::v1::Decision message_of(const kernel::Decision& decision) {
-  recorder::v1::Decision message;
-  message.set_step(decision.step);
-  message.set_slot(slot_name(decision.slot));
+  recorder::v1::Decision message =
+      message_of({decision.slot, *decision.plugin, decision.host->hosting, decision.step}, decision.why);
   message.set_target(decision.target);
-  message.set_why(decision.why);
-  message.set_plugin(decision.plugin->declaration.name);
-  message.set_library(decision.plugin->library);
-  message.set_command(decision.plugin->command);
-  message.set_address(decision.plugin->address);
-  message.mutable_settings()->Add(decision.plugin->settings.begin(), decision.plugin->settings.end());
-  message.set_hosting(kernel::hosting_name(decision.host->hosting));
+  return message;
+}
+
+recorder::v1::Decision message_of(const kernel::SwapOrder& order, const std::string& why) {
+  recorder::v1::Decision message;
+  message.set_step(order.step);
+  message.set_slot(slot_name(order.slot));
+  message.set_why(why);
+  message.set_plugin(order.plugin.declaration.name);
+  message.set_library(order.plugin.library);
+  message.set_command(order.plugin.command);
+  message.set_address(order.plugin.address);
+  message.mutable_settings()->Add(order.plugin.settings.begin(), order.plugin.settings.end());
+  if (order.hosting) message.set_hosting(kernel::hosting_name(*order.hosting));
   return message;
 }
 
@@ -85,6 +91,14 @@ kernel::SwapOrder order_of(const recorder::v1::Decision& decision, const Catalog
   const std::string problem = check_flattened(plugin->declaration.properties, order.plugin.settings);
   if (!problem.empty()) fail(problem);
   return order;
+}
+
+kernel::SwapOrder ordered_swap(recorder::v1::Decision order, const Catalog& catalog) {
+  const bool stays = order.hosting().empty();
+  if (stays) order.set_hosting(kernel::hosting_name(kernel::Hosting::kDirect));
+  kernel::SwapOrder swap = order_of(order, catalog);
+  if (stays) swap.hosting.reset();
+  return swap;
 }
 
 void put_in_place(std::span<const recorder::v1::Decision> decisions, const Catalog& catalog,

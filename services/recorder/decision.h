@@ -23,6 +23,10 @@ void put_in_force(const recorder::v1::Decision& decision, std::vector<recorder::
 // is not looked for. Throws std::runtime_error with the reason.
 kernel::SwapOrder order_of(const recorder::v1::Decision& decision, const Catalog& catalog);
 
+// An order of a swap that is to come, as a journal keeps it, and back. Throws std::runtime_error with the reason.
+recorder::v1::Decision message_of(const kernel::SwapOrder& order, const std::string& why);
+kernel::SwapOrder ordered_swap(recorder::v1::Decision order, const Catalog& catalog);
+
 // Those of the decisions in force answer in `begun`. Throws std::runtime_error as order_of(), or where a slot has no such place.
 void put_in_place(std::span<const recorder::v1::Decision> decisions, const Catalog& catalog,
                   kernel::EnvironmentDescription* begun);

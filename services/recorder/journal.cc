@@ -18,7 +18,7 @@ namespace gravitas {
 namespace {
 
 constexpr std::array<unsigned char, 8> kJournalMagic = {0x89, 'G', 'R', 'V', 'J', '\r', '\n', 0x1a};
-constexpr std::uint32_t kJournalVersion = 1;
+constexpr std::uint32_t kJournalVersion = 2;
 
 // What waits in memory is written at this size, or when it has waited so long.
 constexpr std::size_t kLargestBuffer = 64 * 1024;
@@ -32,7 +32,7 @@ struct JournalHeader {
 };
 static_assert(sizeof(JournalHeader) == 40);
 
-constexpr std::uint8_t kCommit = 1, kDecision = 2, kEdit = 3;
+constexpr std::uint8_t kCommit = 1, kDecision = 2, kEdit = 3, kOrder = 4;
 
 struct RecordHead {
   std::uint8_t kind;
@@ -93,10 +93,15 @@ bool has_whole_record_behind(std::span<const std::byte> bytes, std::uint64_t bef
     if (begins_with_record(bytes.subspan(bad), check_of(bytes.first(bad), before))) return true;
   for (std::size_t place = kCheckSize; place < bytes.size(); ++place) {
     const auto kind = std::to_integer<std::uint8_t>(bytes[place]);
-    if (kind < kCommit || kind > kEdit) continue;
+    if (kind < kCommit || kind > kOrder) continue;
     if (begins_with_record(bytes.subspan(place), check_at(bytes, place - kCheckSize))) return true;
   }
   return false;
+}
+
+bool is_same_order(recorder::v1::Decision a, recorder::v1::Decision b) {
+  a.clear_why(), b.clear_why();
+  return a.SerializeAsString() == b.SerializeAsString();
 }
 
 // False if the content is impossible.
@@ -113,6 +118,13 @@ bool take_record(std::uint8_t kind, std::span<const std::byte> payload, std::uin
     if (edit.step() > after) reading->edits.push_back(std::move(edit));
     return true;
   }
+  if (kind == kOrder) {
+    recorder::v1::Decision order;
+    if (!order.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) return false;
+    std::erase_if(reading->orders, [&](const recorder::v1::Decision& one) { return is_same_order(one, order); });
+    if (order.step() > after && order.why() != kCalledOff) reading->orders.push_back(std::move(order));
+    return true;
+  }
   CommitPayload commit;
   if (kind != kCommit || payload.size() != sizeof commit) return false;
   std::memcpy(&commit, payload.data(), sizeof commit);
@@ -127,6 +139,12 @@ bool take_record(std::uint8_t kind, std::span<const std::byte> payload, std::uin
 bool is_same_edit(const edit::v1::Edit& a, const edit::v1::Edit& b) {
   return a.step() == b.step() && std::ranges::equal(a.changes(), b.changes(), {}, &edit::v1::Change::SerializeAsString,
                                                     &edit::v1::Change::SerializeAsString);
+}
+
+JournalReading JournalReading::anew() const {
+  JournalReading reading;
+  reading.orders = orders;
+  return reading;
 }
 
 JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, std::uint32_t after) {
@@ -187,6 +205,7 @@ JournalWriter::JournalWriter(const std::string& path, const Hash& run, const Jou
   buffer_.assign(bytes, bytes + sizeof header);
   try {
     flush();
+    for (const recorder::v1::Decision& order : known.orders) append_order(order);
   } catch (const std::system_error&) {
     close(file_);
     throw;
@@ -205,6 +224,8 @@ void JournalWriter::append(const JournalEntry& commit) {
 }
 
 void JournalWriter::append(const recorder::v1::Decision& decision) { put_message(kDecision, decision); }
+
+void JournalWriter::append_order(const recorder::v1::Decision& order) { put_message(kOrder, order); }
 
 void JournalWriter::append(const edit::v1::Edit& edit) {
   if (known_edits_.empty() || !is_same_edit(known_edits_.front(), edit)) return put_message(kEdit, edit);

@@ -6,11 +6,13 @@
 //   kinds:  1 commit: step 4, chain hash 16 (36 bytes a step in all)
 //           2 decision: a message recorder.v1.Decision; who answers from its step on
 //           3 edit: a message edit.v1.Edit; how the scene is from its step on
+//           4 order: a message recorder.v1.Decision; a swap that was ordered for its step (why: "swap", or "setting" of a
+//             changed setting), or was called off ("called off")
 //
 // A check is XXH3-64 of the record, seeded with the check before it, so that records can neither be changed nor
 // exchanged. `run` is the digest of the scene's identity and the build. A record that is not whole (a crash tears the
 // last one) ends the journal; where whole ones stand behind it the file is damaged, which no crash of the program does (a
-// power failure may). Decisions and edits change what the next commit is made of, and are written before it; commits may be buffered, since the journal
+// power failure may). Decisions, edits and orders change what a later commit is made of, and are written before it; commits may be buffered, since the journal
 // only vouches for them.
 #pragma once
 
@@ -26,6 +28,9 @@
 
 namespace gravitas {
 
+// Why of an order.
+inline constexpr const char *kOrderOfSwap = "swap", *kOrderOfSetting = "setting", *kCalledOff = "called off";
+
 struct JournalEntry {
   std::uint32_t step;
   Hash chain;
@@ -36,11 +41,15 @@ struct JournalReading {
   std::vector<JournalEntry> commits;              // beyond the step asked for, ascending
   std::vector<recorder::v1::Decision> decisions;  // for steps beyond it
   std::vector<edit::v1::Edit> edits;              // likewise
+  std::vector<recorder::v1::Decision> orders;     // likewise, each once, without those that were called off
   std::uint64_t end = 0;                          // offset behind the last whole record; 0: not a journal of this run
   std::uint64_t check = 0;                        // of that record
   std::uint32_t last_step = 0;                    // of all commits
   std::string note;                               // what was left aside and why; empty: nothing
   bool is_damaged = false;                        // what was left aside is more than a torn end
+
+  // For a journal of another file, which knows the orders alone.
+  JournalReading anew() const;
 };
 
 // The same changes before the same step, wherever bodies were.
@@ -51,8 +60,8 @@ JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, s
 
 class JournalWriter {
  public:
-  // Goes on behind what was read; a reading of nothing starts a new journal. Throws std::system_error if the file cannot
-  // be made, std::runtime_error if another run is writing it.
+  // Goes on behind what was read; a reading without an end starts a new journal, with its orders. Throws
+  // std::system_error if the file cannot be made, std::runtime_error if another run is writing it.
   JournalWriter(const std::string& path, const Hash& run, const JournalReading& known);
   ~JournalWriter();
   JournalWriter(const JournalWriter&) = delete;
@@ -63,6 +72,8 @@ class JournalWriter {
   void append(const JournalEntry& commit);
   // Written at once.
   void append(const recorder::v1::Decision& decision);
+  // That a swap is ordered, or called off; written at once.
+  void append_order(const recorder::v1::Decision& order);
   // One that the journal knows and that is made again is not written again.
   void append(const edit::v1::Edit& edit);
   void flush();

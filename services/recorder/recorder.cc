@@ -66,6 +66,10 @@ void Recorder::note_edit(const edit::v1::Edit& edit) {
   if (journal_) journal_->append(edit);
 }
 
+void Recorder::note_order(const recorder::v1::Decision& order) {
+  if (journal_) journal_->append_order(order);
+}
+
 void Recorder::check(const JournalEntry& commit) {
   while (next_expected_ < expected_.size() && expected_[next_expected_].step < commit.step) ++next_expected_;
   if (next_expected_ == expected_.size()) return;

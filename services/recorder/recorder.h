@@ -42,6 +42,8 @@ class Recorder final : public kernel::CommitListener {
   // Edits made before the run begins here, and one that has been made: written to the journal at once.
   void set_edits(std::vector<edit::v1::Edit> edits) { edits_ = std::move(edits); }
   void note_edit(const edit::v1::Edit& edit);
+  // A swap was ordered, or called off: for the journal alone, at once.
+  void note_order(const recorder::v1::Decision& order);
 
   // A listener decides about pairs: nobody goes on from what is kept from now on.
   void note_listener(bool decided = true) { listener_decided_ = decided; }

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "plugin_sdk/plugin.h"
+#include "plugin_sdk/slots.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
@@ -108,6 +109,29 @@ Resumption read_resumption(const RunOptions& options, const kernel::EnvironmentD
   Resumption resumed{std::move(*checkpoint), std::move(journal)};
   warn_of_other_builds(resumed, warnings);
   return resumed;
+}
+
+bool has_made(const recorder::v1::Checkpoint& checkpoint, const kernel::SwapOrder& swap) {
+  return std::ranges::any_of(checkpoint.decisions(), [&](const recorder::v1::Decision& decision) {
+    return decision.step() == swap.step && decision.slot() == slot_name(swap.slot) &&
+           decision.plugin() == swap.plugin.declaration.name;
+  });
+}
+
+std::vector<LiveOrder> orders_to_come(const Resumption& resumed, const Catalog& catalog,
+                                      std::vector<std::string>* warnings) {
+  std::vector<LiveOrder> orders;
+  for (const recorder::v1::Decision& one : resumed.journal.orders) {
+    if (one.step() <= std::max(resumed.journal.last_step, resumed.checkpoint.step())) continue;
+    try {
+      LiveOrder order{ordered_swap(one, catalog), one.why() == kOrderOfSetting};
+      if (!has_made(resumed.checkpoint, order.swap)) orders.push_back(std::move(order));
+    } catch (const std::runtime_error& problem) {
+      warnings->push_back(
+          fmt::format("the swap that was ordered for step {} is not ordered again: {}", one.step(), problem.what()));
+    }
+  }
+  return orders;
 }
 
 Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel::EnvironmentDescription& description,

@@ -25,6 +25,18 @@ struct Resumption {
 Resumption read_resumption(const RunOptions& options, const kernel::EnvironmentDescription& description,
                            std::vector<std::string>* warnings);
 
+// Also of a step that was not made.
+bool has_made(const recorder::v1::Checkpoint& checkpoint, const kernel::SwapOrder& swap);
+
+// A swap that was ordered while the run was served, and is still to come.
+struct LiveOrder {
+  kernel::SwapOrder swap;
+  bool is_setting;  // that was changed
+};
+// Those that the journal knows for steps that it does not know. One whose plugin is not to be had is warned of.
+std::vector<LiveOrder> orders_to_come(const Resumption& resumed, const Catalog& catalog,
+                                      std::vector<std::string>* warnings);
+
 // Who answers where a run goes on, and who begins, so that swaps that were made are made again (recorder/decision.h).
 struct Answering {
   kernel::EnvironmentDescription now, begun;

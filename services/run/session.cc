@@ -271,27 +271,25 @@ class Run final : private kernel::CommitListener {
     const std::uint32_t step = resumed.checkpoint.step();
     warn_of_unknown_swaps(swaps_, resumed.checkpoint, &warnings_);
     // one of a step that was not made is in the checkpoint already
-    const auto is_restored = [&](const kernel::SwapOrder& one) {
-      return std::ranges::any_of(resumed.checkpoint.decisions(), [&](const recorder::v1::Decision& decision) {
-        return decision.step() == one.step && decision.slot() == slot_name(one.slot) &&
-               decision.plugin() == one.plugin.declaration.name;
-      });
-    };
+    const auto is_restored = [&](const kernel::SwapOrder& one) { return has_made(resumed.checkpoint, one); };
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step || is_restored(one); });
     from_checkpoint(options_.resume, [&] {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
       *answering = answering_at(resumed.checkpoint, description_, catalog_);
-      for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
-        kernel::SwapOrder order = order_of(decision, catalog_);
+      const auto order_again = [&](kernel::SwapOrder order) {
         const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
           return one.slot == order.slot && one.step == order.step &&
                  one.plugin.declaration.name == order.plugin.declaration.name &&
                  have_same_settings(one.plugin, order.plugin);
         });
-        if (is_ordered || is_restored(order)) continue;
-        if (decision.why() != "swap") note_takeover(decision, &taken_over_, &warnings_);
+        if (is_ordered || is_restored(order)) return false;
         swaps_.push_back(std::move(order));
-      }
+        return true;
+      };
+      for (const auto& decision : resumed.journal.decisions)
+        if (order_again(order_of(decision, catalog_)) && decision.why() != "swap")
+          note_takeover(decision, &taken_over_, &warnings_);
+      for (LiveOrder& one : orders_to_come(resumed, catalog_, &warnings_)) order_again(std::move(one.swap));
     });
     // how far hosting may differ is for the command line to say
     for (auto* one : {&answering->now, &answering->begun}) apply_hosting(options_.hosting, one);
@@ -502,7 +500,7 @@ class Run final : private kernel::CommitListener {
     try {
       // the journal of another file starts anew
       recorder_->keep(checkpoint_path_, options_.checkpoint_every,
-                      goes_on_in_its_checkpoint(options_) ? journal_ : JournalReading{}, *environment_);
+                      goes_on_in_its_checkpoint(options_) ? journal_ : journal_.anew(), *environment_);
     } catch (const std::system_error& error) {
       if (is_disk_error(error.code())) throw;
       throw BadInput(error.what());

@@ -123,8 +123,8 @@ TEST(ServedOrders, TheCommandThatGoesOnHasThem) {
   EXPECT_THAT(served.client.status().last_warning(), Not(HasSubstr("what was set")));
   served.client.set_property(parse_set_request("Solver.Iterations=7"));
   EXPECT_THAT(served.run.save_checkpoint()->go_on_by, Not(HasSubstr("Iterations")));
-  EXPECT_THAT(served.client.status().last_warning(),
-              HasSubstr("what was set of Sequential for step 11 is not part of"));
+  // the journal beside the checkpoint has it
+  EXPECT_THAT(served.client.status().last_warning(), Not(HasSubstr("what was set")));
 }
 
 TEST(ServedOrders, ACaptureWritesOverNoCheckpoint) {

@@ -151,6 +151,70 @@ TEST(ServedResume, GoesOnBeforeAShortenedLastStep) {
   EXPECT_EQ(resumed.to_the_end().chain_hash(), end);
 }
 
+// Whoever kills the server loses no order of a swap, changed settings among them; what was called off stays so.
+TEST(ServedResume, OrdersAgainWhatIsToCome) {
+  const gravitas::harness::ScratchFolder folder;
+  const auto begin = [](Served* one) {
+    one->client.swap(harness::parse_swap_request("integrator=RK4@step=50"));
+    const std::uint32_t newton = one->client.swap(harness::parse_swap_request("solver=Newton@step=60")).number();
+    one->client.step(10);
+    one->run.call_off([&] {
+      api::CallOffRequest request;
+      request.set_number(newton);
+      return request;
+    }());
+    one->client.set_property(harness::parse_set_request("Solver.Iterations=1"));
+  };
+  Served quiet(sample("direct"));
+  begin(&quiet);
+  const std::string chain = quiet.to_the_end().chain_hash();
+  EXPECT_NE(chain, quiet_chain());
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  options.run.checkpoint_every = 10;  // else the steps would be those of the journal, which waits before it writes them
+  {
+    Served served(options);
+    begin(&served);
+  }
+  ServeOptions again = sample("direct");
+  again.run.resume = options.run.checkpoint;
+  EXPECT_EQ(harness::run_quietly(again.run).report.chain_hash(), chain);
+  // twice, and where the second one keeps its own
+  for (const char* kept : {"", "served.ck", "other.ck", "third.ck"}) {
+    again.run.checkpoint = *kept == '\0' ? "" : folder.path(kept);
+    {
+      Served resumed(again);
+      const api::Status status = resumed.client.status();
+      EXPECT_EQ(status.step(), 10U);
+      ASSERT_EQ(status.swaps_size(), 2) << kept;
+      EXPECT_EQ(status.swaps(0).to(), "RK4");
+      EXPECT_EQ(status.swaps(0).step(), 50U);
+      EXPECT_EQ(status.swaps(1).to(), "Sequential");
+      if (*kept == '\0') EXPECT_EQ(resumed.to_the_end().chain_hash(), chain);
+    }
+    if (*kept != '\0') again.run.resume = again.run.checkpoint;
+  }
+  again.run.checkpoint.clear();
+  EXPECT_EQ(harness::run_quietly(again.run).report.chain_hash(), chain);
+}
+
+TEST(ServedResume, TellsOfAnOrderWhosePluginIsNotToBeHad) {
+  const gravitas::harness::ScratchFolder folder;
+  const std::string copy = folder.path("copy.so");
+  std::filesystem::copy(in_build("/lib/gravitas/solver_newton.so"), copy);
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  {
+    Served served(options);
+    served.client.swap(harness::parse_swap_request("solver=" + copy + "@step=50"));
+  }
+  options.run.resume = options.run.checkpoint;
+  Served resumed(options);
+  EXPECT_EQ(resumed.client.status().swaps_size(), 0);
+  EXPECT_THAT(resumed.client.status().last_warning(), HasSubstr("the swap that was ordered for step 50 is not ordered "
+                                                                "again: "));
+}
+
 // Long after its probation, and within it.
 TEST(ServedResume, ListsTheSwapsThatWereMade) {
   for (const std::uint32_t kept : {20U, 40U}) {
