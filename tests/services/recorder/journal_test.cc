@@ -119,6 +119,34 @@ TEST(Journal, RecordsCannotBeExchangedOrRepeated) {
   EXPECT_EQ(steps_of(read_journal(bytes, kRun, 0)), range(1, 1));
 }
 
+// Each once, and in the journal of another file, too.
+TEST(Journal, OrdersStandUntilTheyAreCalledOff) {
+  const ScratchFolder folder;
+  const auto order = [](std::uint32_t step, const char* why) {
+    recorder::v1::Decision message;
+    message.set_step(step);
+    message.set_plugin("Newton");
+    message.set_why(why);
+    return message;
+  };
+  {
+    JournalWriter writer(folder.path("j"), kRun, {});
+    for (const std::uint32_t step : {5U, 30U, 40U, 40U}) writer.append_order(order(step, kOrderOfSwap));
+    writer.append_order(order(30, kCalledOff));
+    writer.append_order(order(50, kOrderOfSetting));
+  }
+  const JournalReading reading = read_journal(read_whole_file(folder.path("j")), kRun, 10);
+  { const JournalWriter other(folder.path("other"), kRun, reading.anew()); }
+  for (const char* name : {"j", "other"}) {
+    const JournalReading again = read_journal(read_whole_file(folder.path(name)), kRun, 10);
+    EXPECT_EQ(again.note, "");
+    ASSERT_EQ(again.orders.size(), 2U) << name;
+    EXPECT_EQ(again.orders[0].step(), 40U);
+    EXPECT_EQ(again.orders[1].step(), 50U);
+    EXPECT_EQ(again.orders[1].why(), kOrderOfSetting);
+  }
+}
+
 TEST(Journal, ThatOfAnotherRunIsNone) {
   const ScratchFolder folder;
   const std::string path = folder.path("j");
