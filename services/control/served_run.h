@@ -80,7 +80,10 @@ class ServedRun final : private kernel::CommitListener {
   // Brings the checkpoint that options ask for to the last commit, if they do. Throws std::system_error.
   std::optional<Saved> save_checkpoint();
 
+  // Of a step that takes long, as it was when that began.
   api::Status status();
+  // As it is when the step has ended.
+  api::Status status_between_steps();
   void pause();
   void resume();
   void reset();

@@ -87,6 +87,10 @@ api::Status ServedRun::status() {
   return done.get();
 }
 
+api::Status ServedRun::status_between_steps() {
+  return between_steps([this] { return status_now(); });
+}
+
 api::Status ServedRun::status_now() {
   api::Status status;
   status.set_scene(scene_name_);

@@ -72,13 +72,13 @@ class ControlServer::Service final : public api::Control::Service {
     return then_status([&] { run_.reset(); }, reply);
   }
   grpc::Status Step(grpc::ServerContext* context, const api::StepRequest* request, api::Status* reply) override {
-    return then_status(
-        [&] {
-          const std::future<void> made = run_.step(request->steps());
-          while (made.wait_for(kGlance) == std::future_status::timeout)
-            if (context->IsCancelled()) run_.pause();
-        },
-        reply);
+    return answered([&] {
+      const std::future<void> made = run_.step(request->steps());
+      while (made.wait_for(kGlance) == std::future_status::timeout)
+        if (context->IsCancelled()) run_.pause();
+      // what the last step left may still be being written
+      *reply = run_.status_between_steps();
+    });
   }
   grpc::Status Swap(grpc::ServerContext*, const api::SwapRequest* request, api::SwapOrdered* reply) override {
     return answered([&] { *reply = run_.swap(*request); });
