@@ -9,6 +9,7 @@
 #include "services/edit/edited_scene.h"
 #include "services/recorder/decision.h"
 #include "services/run/exchange_spec.h"
+#include "services/run/kernel_names.h"
 
 namespace gravitas {
 namespace {
@@ -44,12 +45,17 @@ std::vector<kernel::SwapOrder> swaps_to_make(std::vector<kernel::SwapOrder> orde
   return made;
 }
 
-// Types that an edit has added may be none of those that who answered before serves.
-void require_stand_ins(const kernel::EnvironmentDescription& scene, const kernel::EnvironmentDescription& begun) {
+// Types that an edit has added may be none of those that who answered before a swap serves.
+void require_stand_ins(const kernel::EnvironmentDescription& scene, const kernel::EnvironmentDescription& begun,
+                       const std::vector<recorder::v1::Decision>& decisions) {
   const auto require = [&](Slot slot, const auto& elements) {
     std::vector<std::string> types;
     for (const auto& one : elements) types.push_back(one.type);
     for (std::size_t row = 0; row < scene.slot(slot).plugins.size(); ++row) {
+      const auto is_of_row = [&](const recorder::v1::Decision& one) {
+        return is_swap(one) && one.slot() == slot_name(slot) && one.target() == row;
+      };
+      if (std::ranges::none_of(decisions, is_of_row)) continue;
       const PluginDeclaration& before = begun.slot(slot).plugins[row].declaration;
       const std::string why = why_no_stand_in(scene.slot(slot).plugins[row].declaration, before, types);
       if (!why.empty()) throw std::runtime_error(before.name + ": " + why);
@@ -68,7 +74,7 @@ EditedScene::Successor EditedScene::succeed_with_swaps(const kernel::Environment
                                                        std::vector<recorder::v1::Decision>* decisions) const {
   kernel::EnvironmentDescription begun = answering;
   take_back_swaps(*decisions, catalog, description_, &begun);
-  require_stand_ins(description_, begun);
+  require_stand_ins(description_, begun, *decisions);
   const std::vector<kernel::SwapOrder> swaps = swaps_to_make(past_swaps(*decisions, catalog, answering), begun);
   // else those of before may let their host go
   begun.asks_forces = std::ranges::find(swaps, Slot::kForce, &kernel::SwapOrder::slot) != swaps.end();
@@ -92,26 +98,36 @@ EditedScene::Successor EditedScene::succeed(const kernel::Environment& now,
                                             const kernel::EnvironmentDescription& answering, const Catalog& catalog,
                                             const kernel::HostStarter& starter,
                                             std::vector<recorder::v1::Decision>* decisions) {
+  const std::vector<recorder::v1::Decision> known_before = *decisions;
   translate_decisions(before_, description_, decisions);
   Successor next;
   std::string why = "its slot has other plugins in the edited scene, or none";
-  try {
-    next = succeed_with_swaps(now, answering, catalog, starter, decisions);
-  } catch (const std::exception& problem) {
-    bool had_swaps = false;
-    for (recorder::v1::Decision& decision : *decisions) had_swaps |= settle(&decision);
-    if (!had_swaps) throw;
+  const auto go_on = [&] {
     next = {start(answering, starter), {}, {}};
     next.parted = hand_over(now, next.environment.get());
-    why = fmt::format("who answered before cannot be had in the edited scene: {}", problem.what());
-    warnings_.push_back(fmt::format("edit before step {}: after it no swap is taken back: {}", edit_.step(), why));
+  };
+  if (std::ranges::none_of(*decisions, is_swap)) {
+    go_on();
+  } else {
+    try {
+      next = succeed_with_swaps(now, answering, catalog, starter, decisions);
+    } catch (const std::exception& problem) {
+      for (recorder::v1::Decision& decision : *decisions) settle(&decision);
+      go_on();
+      why = fmt::format("who answered before cannot be had in the edited scene: {}", problem.what());
+      warnings_.push_back(fmt::format("edit before step {}: after it no swap is taken back: {}", edit_.step(), why));
+    }
   }
   const std::vector<kernel::SwapRecord> known = next.environment->swaps();
   for (kernel::SwapRecord& swap : now.swaps()) {
     const bool goes_on = std::ranges::any_of(known, [&](const kernel::SwapRecord& one) {
-      return one.slot == swap.slot && one.step == swap.step && one.to == swap.to;
+      return one.slot == swap.slot && one.step == swap.step && plugin_of(one.to) == plugin_of(swap.to);
     });
-    if (goes_on || swap.state != kernel::SwapState::kProbation) continue;
+    // what took over in a step of the journal is none
+    const bool was_swap = std::ranges::any_of(known_before, [&](const recorder::v1::Decision& one) {
+      return is_swap(one) && one.slot() == slot_name(swap.slot) && one.step() == swap.step;
+    });
+    if (goes_on || !was_swap || swap.state != kernel::SwapState::kProbation) continue;
     swap.state = kernel::SwapState::kCommitted;
     swap.reason = fmt::format("the edit before step {} ended its probation: {}", edit_.step(), why);
     next.settled.push_back(std::move(swap));

@@ -13,9 +13,6 @@
 namespace gravitas {
 namespace {
 
-// That may be rolled back.
-bool is_swap(const recorder::v1::Decision& decision) { return decision.why() == "swap"; }
-
 std::optional<kernel::Hosting> find_hosting(const std::string& name) {
   for (const auto hosting : {kernel::Hosting::kDirect, kernel::Hosting::kSharedMemory, kernel::Hosting::kGrpc})
     if (name == kernel::hosting_name(hosting)) return hosting;
@@ -44,6 +41,8 @@ recorder::v1::Decision message_of(const kernel::SwapOrder& order, const std::str
   if (order.hosting) message.set_hosting(kernel::hosting_name(*order.hosting));
   return message;
 }
+
+bool is_swap(const recorder::v1::Decision& decision) { return decision.why() == "swap"; }
 
 bool settle(recorder::v1::Decision* decision) {
   decision->clear_before();

@@ -13,6 +13,9 @@ namespace gravitas {
 
 recorder::v1::Decision message_of(const kernel::Decision& decision);
 
+// True of one by a swap that may still be taken back.
+bool is_swap(const recorder::v1::Decision& decision);
+
 // A swap becomes one that is not taken back any more; false if it was none.
 bool settle(recorder::v1::Decision* decision);
 

@@ -16,10 +16,10 @@ inline const char* fault_kind_name(kernel::FaultKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-// "preparing", "shadow", …
 // Of who comes or goes in a swap, as it is told, the plugin itself, without its library or hosting.
 inline std::string_view plugin_of(std::string_view swapped) { return swapped.substr(0, swapped.find(" (")); }
 
+// "preparing", "shadow", …
 inline const char* swap_state_name(kernel::SwapState state) {
   static constexpr const char* kNames[] = {"preparing", "shadow", "probation", "committed", "rolled back", "refused"};
   return kNames[static_cast<std::size_t>(state)];

@@ -41,15 +41,18 @@ std::string exchange_warning(const kernel::FaultRecord& record) {
   return {};
 }
 
-// Among the first `known` of the report; null if it is not there.
+// Among the first `known` of the report, rather one that is in place; null if it is not there.
 report::v1::SwapRecord* find_swap(const kernel::SwapRecord& record, int known, report::v1::Report* report) {
+  report::v1::SwapRecord* found = nullptr;
   for (int i = known; i-- > 0;) {
     report::v1::SwapRecord& one = *report->mutable_swaps(i);
-    if (one.step() == record.step && one.slot() == slot_name(record.slot) &&
-        plugin_of(one.to()) == plugin_of(record.to))
-      return &one;
+    if (one.step() != record.step || one.slot() != slot_name(record.slot) ||
+        plugin_of(one.to()) != plugin_of(record.to))
+      continue;
+    if (is_in_place(one)) return &one;
+    if (found == nullptr) found = &one;
   }
-  return nullptr;
+  return found;
 }
 
 bool is_to_come(const report::v1::SwapRecord& swap) {
@@ -183,9 +186,12 @@ void write_swaps(const kernel::Environment& environment, std::span<const recorde
       return decision.step() == one.step && decision.slot() == slot_name(one.slot) &&
              decision.plugin() == plugin_of(one.to);
     };
-    if (!one.only_compared && std::ranges::any_of(taken_over, is_it)) continue;
+    const bool is_made = one.state == kernel::SwapState::kProbation || one.state == kernel::SwapState::kCommitted;
+    if (!one.only_compared && is_made && std::ranges::any_of(taken_over, is_it)) continue;
     if (report::v1::SwapRecord* before = one.only_compared ? nullptr : find_swap(one, known, report)) {
-      if (!is_in_place(*before) || before->outcome() == swap_state_name(one.state)) continue;
+      // of a step that was broken off it is made again
+      const bool is_begun = one.state == kernel::SwapState::kPreparing || one.state == kernel::SwapState::kShadow;
+      if (is_begun || !is_in_place(*before) || before->outcome() == swap_state_name(one.state)) continue;
       before->set_outcome(swap_state_name(one.state));
       before->set_reason(one.reason);
       continue;

@@ -66,8 +66,11 @@ template <typename Messages>
 bool renew_swap(const kernel::SwapRecord& record, Messages* messages, int count) {
   for (int i = count; i-- > 0;) {
     auto& one = (*messages)[i];
-    if (!is_in_place(one) || one.slot() != slot_name(record.slot) || one.step() != record.step || one.to() != record.to)
+    if (!is_in_place(one) || one.slot() != slot_name(record.slot) || one.step() != record.step ||
+        plugin_of(one.to()) != plugin_of(record.to))
       continue;
+    // of a step that was broken off it is made again
+    if (record.state == kernel::SwapState::kPreparing || record.state == kernel::SwapState::kShadow) return true;
     one.set_outcome(swap_state_name(record.state));
     one.set_reason(record.reason);
     return true;
