@@ -43,6 +43,8 @@ constexpr Level kOrder[] = {Level::kHandshake, Level::kPurity, Level::kWire,
 
 constexpr const char* kInterrupted = "interrupted";
 
+double usual_limit(const Examinee& plugin) { return plugin.is_command() ? kQuickLimitOfCommands : kQuickLimit; }
+
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // The run of one examination.
@@ -79,8 +81,7 @@ class Run {
 std::string Run::why_ended() const {
   if (interrupted_()) return kInterrupted;
   const Options& options = examination_.options;
-  const double usual = examination_.examinee.is_command() ? kQuickLimitOfCommands : kQuickLimit;
-  const double limit = options.quick_limit > 0.0 ? options.quick_limit : usual;
+  const double limit = options.quick_limit > 0.0 ? options.quick_limit : usual_limit(examination_.examinee);
   if (!options.quick || seconds_since(start_) < limit) return {};
   return fmt::format("its calls take too long for --quick, which ends after {:g} s", limit);
 }
@@ -236,7 +237,12 @@ Examination::Examination(const Examinee& plugin, Options chosen, std::function<v
     : examinee(plugin),
       options(std::move(chosen)),
       patience(patience_of(plugin, options.quick)),
-      on_progress(std::move(progress)) {}
+      on_progress(std::move(progress)) {
+  // who gives all of it longer gives each call longer, up to what a full check gives it
+  const double longer = std::max(1.0, options.quick_limit / usual_limit(plugin));
+  patience.deadline = std::min(longer * patience.deadline, Patience{}.deadline);
+  patience.cap = std::min(longer * patience.cap, Patience{}.cap);
+}
 
 void Examination::show(std::uint64_t done, std::uint64_t all) const {
   Progress shown = now;

@@ -75,7 +75,9 @@ void add_check(CLI::App* app, Action* action) {
       "Few calls, and the short cases only: some two seconds. Of a plugin whose calls are slow what 20 s (a "
       "command: 60 s) do not suffice for is not judged");
   command
-      ->add_option("--quick-limit", arguments->options.quick_limit, "With --quick: these seconds instead of 20 or 60")
+      ->add_option("--quick-limit", arguments->options.quick_limit,
+                   "With --quick: these seconds instead of 20 or 60; each call has as much longer, up to what it has "
+                   "without --quick")
       ->check(seconds_between(1e-3, 1e6))
       ->needs(quick);
   CLI::Option* level = command->add_option("--level", arguments->options.level, "Judge this level only: C0 to C5")

@@ -8,7 +8,6 @@
 #include "plugin_sdk/stand_in.h"
 #include "services/edit/edited_scene.h"
 #include "services/recorder/decision.h"
-#include "services/run/exchange_spec.h"
 #include "services/run/kernel_names.h"
 
 namespace gravitas {
@@ -23,26 +22,6 @@ void translate_decisions(const kernel::EnvironmentDescription& before, const ker
     if (decision.has_before()) decision.mutable_before()->set_target(target);
     return target == kNone;
   });
-}
-
-// With the swap of one plugin of a slot all are told: the others stand there already. Where all do, as after a move, any one
-// is made.
-std::vector<kernel::SwapOrder> swaps_to_make(std::vector<kernel::SwapOrder> orders,
-                                             const kernel::EnvironmentDescription& begun) {
-  const auto stands = [&](const kernel::SwapOrder& order) {
-    return std::ranges::any_of(begun.slot(order.slot).plugins, [&](const kernel::PluginChoice& one) {
-      return one.library == order.plugin.library && one.command == order.plugin.command &&
-             one.address == order.plugin.address && have_same_settings(one, order.plugin);
-    });
-  };
-  std::stable_partition(orders.begin(), orders.end(), [&](const kernel::SwapOrder& order) { return !stands(order); });
-  std::vector<kernel::SwapOrder> made;
-  for (kernel::SwapOrder& order : orders) {
-    const bool is_told = std::ranges::any_of(
-        made, [&](const kernel::SwapOrder& one) { return one.slot == order.slot && one.step == order.step; });
-    if (!is_told || !stands(order)) made.push_back(std::move(order));
-  }
-  return made;
 }
 
 // Types that an edit has added may be none of those that who answered before a swap serves.
@@ -75,7 +54,7 @@ EditedScene::Successor EditedScene::succeed_with_swaps(const kernel::Environment
   kernel::EnvironmentDescription begun = answering;
   take_back_swaps(*decisions, catalog, description_, &begun);
   require_stand_ins(description_, begun, *decisions);
-  const std::vector<kernel::SwapOrder> swaps = swaps_to_make(past_swaps(*decisions, catalog, answering), begun);
+  const std::vector<kernel::SwapOrder> swaps = past_swaps(*decisions, catalog, answering);
   // else those of before may let their host go
   begun.asks_forces = std::ranges::find(swaps, Slot::kForce, &kernel::SwapOrder::slot) != swaps.end();
   Successor next{start(begun, starter), {}, {}};

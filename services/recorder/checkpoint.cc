@@ -11,7 +11,6 @@
 #include <stdexcept>
 #include <variant>
 
-#include "plugin_sdk/body.h"
 #include "plugin_sdk/channel/digest.h"
 #include "plugin_sdk/slots.h"
 #include "services/recorder/identity.h"
@@ -196,13 +195,9 @@ kernel::SavedState saved_state_of(Checkpoint* checkpoint) {
   visit_columns(checkpoint->mutable_state(), [&]<typename T>(const char* name, pb::RepeatedField<T>* column) {
     saved.columns.push_back({name, std::span<const T>(column->data(), static_cast<std::size_t>(column->size()))});
   });
-  for (const recorder::v1::Budget& one : checkpoint->budgets()) {
-    // no slot has a plugin in that row
-    const std::optional<Slot> slot = find_slot(one.slot());
-    saved.budgets.push_back({slot.value_or(Slot::kSpace),
-                             slot ? one.target() : kNone,
-                             {one.failures(), one.failures_in_a_row(), one.good_answers()}});
-  }
+  for (const recorder::v1::Budget& one : checkpoint->budgets())
+    if (const std::optional<Slot> slot = find_slot(one.slot()))
+      saved.budgets.push_back({*slot, one.target(), {one.failures(), one.failures_in_a_row(), one.good_answers()}});
   return saved;
 }
 

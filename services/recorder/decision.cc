@@ -55,8 +55,13 @@ void put_in_force(const recorder::v1::Decision& decision, std::vector<recorder::
   recorder::v1::Decision kept = decision;
   std::erase_if(*in_force, [&](recorder::v1::Decision& one) {
     if (one.slot() != decision.slot() || one.target() != decision.target()) return false;
-    one.clear_before();
-    if (is_swap(decision)) *kept.mutable_before() = std::move(one);
+    if (!is_swap(decision)) return true;
+    // what is made again, in a step that was broken off, goes back to who was there before it
+    const bool is_again = is_swap(one) && one.step() == decision.step() && one.plugin() == decision.plugin() &&
+                          one.library() == decision.library();
+    if (is_again && !one.has_before()) return true;
+    *kept.mutable_before() = is_again ? one.before() : one;
+    kept.mutable_before()->clear_before();
     return true;
   });
   in_force->push_back(std::move(kept));

@@ -41,20 +41,6 @@ std::string exchange_warning(const kernel::FaultRecord& record) {
   return {};
 }
 
-// Among the first `known` of the report, rather one that is in place; null if it is not there.
-report::v1::SwapRecord* find_swap(const kernel::SwapRecord& record, int known, report::v1::Report* report) {
-  report::v1::SwapRecord* found = nullptr;
-  for (int i = known; i-- > 0;) {
-    report::v1::SwapRecord& one = *report->mutable_swaps(i);
-    if (one.step() != record.step || one.slot() != slot_name(record.slot) ||
-        plugin_of(one.to()) != plugin_of(record.to))
-      continue;
-    if (is_in_place(one)) return &one;
-    if (found == nullptr) found = &one;
-  }
-  return found;
-}
-
 bool is_to_come(const report::v1::SwapRecord& swap) {
   return swap.outcome() == swap_state_name(kernel::SwapState::kPreparing) ||
          swap.outcome() == swap_state_name(kernel::SwapState::kShadow);
@@ -186,16 +172,8 @@ void write_swaps(const kernel::Environment& environment, std::span<const recorde
       return decision.step() == one.step && decision.slot() == slot_name(one.slot) &&
              decision.plugin() == plugin_of(one.to);
     };
-    const bool is_made = one.state == kernel::SwapState::kProbation || one.state == kernel::SwapState::kCommitted;
-    if (!one.only_compared && is_made && std::ranges::any_of(taken_over, is_it)) continue;
-    if (report::v1::SwapRecord* before = one.only_compared ? nullptr : find_swap(one, known, report)) {
-      // of a step that was broken off it is made again
-      const bool is_begun = one.state == kernel::SwapState::kPreparing || one.state == kernel::SwapState::kShadow;
-      if (is_begun || !is_in_place(*before) || before->outcome() == swap_state_name(one.state)) continue;
-      before->set_outcome(swap_state_name(one.state));
-      before->set_reason(one.reason);
-      continue;
-    }
+    const bool is_told = is_in_place(swap_state_name(one.state)) && std::ranges::any_of(taken_over, is_it);
+    if (!one.only_compared && (is_told || renew_swap(one, report->mutable_swaps(), known))) continue;
     report::v1::SwapRecord* swap = one.only_compared ? report->add_comparisons() : report->add_swaps();
     swap->set_step(std::max(one.step, one.since));
     swap->set_slot(slot_name(one.slot));

@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "gravitas/edit/v1/edit.pb.h"
 #include "gravitas/recorder/v1/checkpoint.pb.h"
@@ -54,28 +55,30 @@ std::string pause_text(const kernel::EnvironmentDescription& description, const 
 // Warnings that are alike become the first of them, with their count: "… (275 times)".
 void fold_warnings(report::v1::Report* report);
 
-// True of one that was made and not taken back.
-template <typename Message>
-bool is_in_place(const Message& swap) {
-  return swap.outcome() == swap_state_name(kernel::SwapState::kProbation) ||
-         swap.outcome() == swap_state_name(kernel::SwapState::kCommitted);
+// The outcome of a swap that was made and not taken back.
+inline bool is_in_place(std::string_view outcome) {
+  return outcome == swap_state_name(kernel::SwapState::kProbation) ||
+         outcome == swap_state_name(kernel::SwapState::kCommitted);
 }
 
-// How a swap stands now, in the last of these messages that is of it; false if none is.
+// How a swap stands now, in the last of the first `count` messages that is of it, rather one that is in place; false if none
+// is. One that was refused or taken back stays so, and one that begins again, in a step that was broken off, as it was.
 template <typename Messages>
 bool renew_swap(const kernel::SwapRecord& record, Messages* messages, int count) {
-  for (int i = count; i-- > 0;) {
+  typename Messages::value_type* found = nullptr;
+  for (int i = count; i-- > 0 && (found == nullptr || !is_in_place(found->outcome()));) {
     auto& one = (*messages)[i];
-    if (!is_in_place(one) || one.slot() != slot_name(record.slot) || one.step() != record.step ||
-        plugin_of(one.to()) != plugin_of(record.to))
-      continue;
-    // of a step that was broken off it is made again
-    if (record.state == kernel::SwapState::kPreparing || record.state == kernel::SwapState::kShadow) return true;
-    one.set_outcome(swap_state_name(record.state));
-    one.set_reason(record.reason);
-    return true;
+    const bool is_it = one.slot() == slot_name(record.slot) && one.step() == record.step &&
+                       plugin_of(one.to()) == plugin_of(record.to);
+    if (is_it && (found == nullptr || is_in_place(one.outcome()))) found = &one;
   }
-  return false;
+  if (found == nullptr) return false;
+  const std::string_view outcome = swap_state_name(record.state);
+  const bool begins = record.state == kernel::SwapState::kPreparing || record.state == kernel::SwapState::kShadow;
+  if (begins || !is_in_place(found->outcome()) || found->outcome() == outcome) return true;
+  found->set_outcome(std::string(outcome));
+  found->set_reason(record.reason);
+  return true;
 }
 
 }  // namespace gravitas

@@ -165,6 +165,14 @@ TEST(CheckOfPurity, AnAnswerThatDoesNotComeInTimeIsNoOtherAnswer) {
     EXPECT_THAT(level.why(), testing::Not(testing::HasSubstr("do not repeat"))) << level.level();
 }
 
+// Who gives the check longer gives each call longer.
+TEST(QuickCheck, ThatMayTakeLongerWaitsLonger) {
+  const auto report = check_library(kFaulty + "/slow_with_threads.so",
+                                    {.quick = true, .quick_limit = 30.0, .level = {}, .only_case = "purity/threads"});
+  ASSERT_GE(report.findings_size(), 1) << report.DebugString();
+  EXPECT_THAT(report.findings(0).text(), testing::HasSubstr("its limit here is 1.5 s, 3 s whatever it marks (--quick"));
+}
+
 // A command is judged as a library is, over the one carrier that it has.
 TEST(CheckOfACommand, ThatServesAGoodPluginConforms) {
   const std::vector<std::string> good = libraries_of(kPlugins);

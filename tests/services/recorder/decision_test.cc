@@ -85,6 +85,17 @@ TEST(Decision, WhatASwapGoesBackToHasItsFallback) {
   EXPECT_NE(begun.force.plugins[0].fallback, nullptr);
 }
 
+// A swap is told again where its step was broken off behind the cut-over: it went back to itself then.
+TEST(Decision, ASwapThatIsToldAgainGoesBackToTheSame) {
+  const Scene scene;
+  Decisions in_force;
+  put_in_force(decided("settled swap", 5, scene.c), &in_force);
+  for (int times = 0; times < 2; ++times) put_in_force(decided("swap", 20, scene.b), &in_force);
+  ASSERT_EQ(in_force.size(), 1U);
+  EXPECT_EQ(in_force[0].plugin(), "B");
+  EXPECT_EQ(in_force[0].before().plugin(), "C");
+}
+
 TEST(Decision, ACommandTakesNoNeighboursAlong) {
   const Scene scene("a worker of its own");
   const Decisions fallen{decided("fallback B", 20, scene.b, Hosting::kGrpc)};
