@@ -87,7 +87,7 @@ TEST(ServedOrders, AFaultForLaterOutlivesAnEdit) {
   const api::Status status = served.client.status();
   ASSERT_EQ(status.fault_count(), 1U);
   EXPECT_EQ(status.faults(0).step(), 30U);
-  EXPECT_THAT(status.last_warning(), Not(HasSubstr("solver")));
+  EXPECT_THAT(status.last_warning(), Not(HasSubstr("injected")));
 }
 
 // A library that was built anew has the settings of the moment.
