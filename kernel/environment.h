@@ -229,6 +229,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // smooth.cc: derivatives that agree with the joints.
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
+  bool ask_start_joints();
   void find_joint_impulses();
   bool find_wanted_moves(const DiscrepancyAnswer& joints);
   void find_start_velocities();

@@ -139,7 +139,8 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
     group_intact.emplace_back(arena, joints, 0);
     discrepancy_answers.emplace_back(arena, 8 * joints);
   }
-  discrepancies = DiscrepancyAnswer(arena, rows), held_joints = DiscrepancyAnswer(arena, is_smooth ? rows : 0);
+  discrepancies = DiscrepancyAnswer(arena, rows);
+  for (DiscrepancyAnswer* one : {&held_joints, &start_joints}) *one = DiscrepancyAnswer(arena, is_smooth ? rows : 0);
   discrepancy_body = Column<std::uint32_t>(arena, 0, 2 * rows);
   const auto axis_numbers = [&] { return Column<double>(arena, 0, 3 * rows); };
   discrepancy_force = axis_numbers(), held_force = axis_numbers();

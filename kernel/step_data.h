@@ -65,7 +65,7 @@ struct StepData {
   Column<double> kinematic_acceleration, reaction, discrepancy_force, held_force, reaction_residual,
       wrench_with_reactions;
   // joint_impulses.cc: joints (once others are asked) and poses of the last derivative, what they shall do, and what is none.
-  DiscrepancyAnswer held_joints;
+  DiscrepancyAnswer held_joints, start_joints;  // the second: start_joints.cc
   Column<double> held_position, held_orientation, no_velocity, wanted_along, none_along;
 
   // Stage::kIntegrate: S*, and its time.

@@ -53,10 +53,6 @@ inline constexpr std::uint32_t kTwistDiscrepancy = 1U << 16;
 // gradient's length. For what gives way: springs and dampers.
 inline constexpr std::uint32_t kComponentDiscrepancy = 1U << 17;
 
-// With kRadialDiscrepancy: body 1 is round and the rope rolls off it. x1, taken as fixed in body 1 and carried to a state that body 1
-// is turned from, gives the error to the third order of that turn alone, and its rate to the second.
-inline constexpr std::uint32_t kRollingDiscrepancy = 1U << 18;
-
 // Beside these, in SolverSolveRequest alone: what of the discrepancy acts_as_force() (solver/joint_laws.h) acted among the
 // wrenches while S* was integrated (simulator Smooth), and is not to be applied again. No mode that a constraint may answer.
 inline constexpr std::uint32_t kForcesApplied = 1U << 15;
@@ -77,8 +73,7 @@ constexpr bool is_drive(AxisMode mode) { return mode == AxisMode::kDriven || mod
 constexpr bool is_valid_mode(std::uint32_t modes) {
   const std::uint32_t flags = modes & ~0xFFFU;
   return (flags <= kAngularDiscrepancy || flags == kRadialDiscrepancy ||
-          flags == (kRadialDiscrepancy | kRollingDiscrepancy) || flags == (kAngularDiscrepancy | kSwingDiscrepancy) ||
-          flags == (kAngularDiscrepancy | kTwistDiscrepancy) ||
+          flags == (kAngularDiscrepancy | kSwingDiscrepancy) || flags == (kAngularDiscrepancy | kTwistDiscrepancy) ||
           flags == (kAngularDiscrepancy | kComponentDiscrepancy)) &&
          (modes & 0xFU) <= 5 && ((modes >> 4) & 0xFU) <= 5 && ((modes >> 8) & 0xFU) <= 5;
 }
@@ -100,12 +95,12 @@ struct Discrepancy {
   Vector3 maximum_force = Vector3::Constant(kUnlimited);  // N or N m
   // e of limits and one-sided axes that nothing softens, 0 … 1: what meets them at a speed v leaves them at e v
   double restitution = 0.0;
-  // What the desired velocity along each axis changes by, world, m/s^2 or rad/s^2. Simulator Smooth needs it.
+  // What the desired velocity along each axis changes by, world, m/s^2 or rad/s^2; of an error that curves otherwise than the row does
+  // (a rope that slants off its drum), less what velocities make of the difference. Simulator Smooth needs it.
   Vector3 acceleration = Vector3::Zero();
 
   bool is_angular() const { return (modes & kAngularDiscrepancy) != 0; }
   bool is_radial() const { return (modes & kRadialDiscrepancy) != 0; }
-  bool is_rolling() const { return (modes & kRollingDiscrepancy) != 0; }
   bool is_swing() const { return (modes & kSwingDiscrepancy) != 0; }
   bool is_twist() const { return (modes & kTwistDiscrepancy) != 0; }
   bool is_component() const { return (modes & kComponentDiscrepancy) != 0; }

@@ -19,6 +19,14 @@ bool are_locks(const DiscrepancyColumns& joints) {
   return true;
 }
 
+bool may_let_go(const DiscrepancyColumns& joints) {
+  for (std::size_t row = 0; row < joints.size(); ++row) {
+    const Discrepancy d = joints.at(row);
+    if (may_hold(d, 0) || may_hold(d, 1) || may_hold(d, 2)) return true;
+  }
+  return false;
+}
+
 bool find_lock_errors(const DiscrepancyColumns& here, const DiscrepancyColumns& there, std::span<double> errors) {
   if (!std::ranges::equal(here.mode, there.mode)) return false;
   for (std::size_t row = 0; row < here.size(); ++row) {

@@ -13,6 +13,9 @@ namespace gravitas {
 // nothing that gives way. Such joints hold their place in every state, and their forces follow from that.
 bool are_locks(const DiscrepancyColumns& joints);
 
+// True if some axis holds in some states, by a force that it may not have in others: a limit, a drive with a bound, friction.
+bool may_let_go(const DiscrepancyColumns& joints);
+
 // What the locks of joints are off by in another state, m or rad, along their axes as `here` has them (world, three a
 // discrepancy). False where the joints do not answer alike in both states. Precondition: are_locks(here).
 bool find_lock_errors(const DiscrepancyColumns& here, const DiscrepancyColumns& there, std::span<double> errors);

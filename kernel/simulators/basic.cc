@@ -76,6 +76,7 @@ void Environment::begin_inner_step(double begin, double length) {
   broken_.clear();
   data_.wrench_is_constant[0] = wrench_is_constant_ && !knows_reactions() ? 1 : 0;
   start_wrench_known_ = false;
+  if (knows_reactions()) data_.start_joints.resize(0);
   // no trace of earlier steps: a step must be the same after a restore
   if (!wrench_is_constant_) std::ranges::fill(data_.start_wrench.span(), 0.0);
   if (may_jump_at_start()) find_start_velocities();

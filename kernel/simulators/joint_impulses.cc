@@ -26,13 +26,16 @@ void Environment::find_joint_impulses() {
   data_.none_along.resize(3 * joints.mode.size()), std::ranges::fill(data_.none_along.span(), 0.0);
   data_.discrepancy_force.resize(3 * joints.mode.size());
   data_.block_body.resize(0), data_.block.resize(0);
+  const DiscrepancyAnswer& none = data_.start_joints;  // what holds always needs no start
+  none.resize(0);
   const auto request =
       ids(model_.flags, model_.inverse_mass, model_.inertia, model_.inverse_inertia, model_.damping,
           data_.held_position, data_.held_orientation, data_.no_velocity, data_.no_velocity, data_.no_wrench,
           data_.no_wrench, data_.discrepancy_body, joints.point1, joints.point2, data_.none_along, joints.correction,
           joints.axes, joints.mode, joints.lower, joints.upper, joints.compliance, joints.damping, joints.maximum_force,
           data_.block_body, data_.block, data_.held_position, data_.held_orientation, data_.no_velocity,
-          data_.no_velocity, data_.time_step, data_.wanted_along);
+          data_.no_velocity, data_.time_step, data_.wanted_along, none.point1, none.point2, none.velocity, none.axes,
+          none.mode, none.lower, none.upper, none.compliance, none.damping, none.desired_acceleration);
   const auto reply = ids(told_wrench(), data_.discrepancy_force, data_.reaction_residual);
   ask(Stage::kSolve, &solver_, {stage::Method::kSolverReactions, 0, request, reply}, nullptr,
       [&](const auto& answer) { return validator_.reactions(answer); });

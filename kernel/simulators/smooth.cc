@@ -15,19 +15,24 @@
 
 #include "kernel/environment.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/joint_locks.h"
 #include "plugin_sdk/wrench_jacobian.h"
 
 namespace gravitas::kernel {
 
 void Environment::ask_reactions() {
-  ask_discrepancies(data_.derivative_time, data_.derivative_position, data_.derivative_orientation,
-                    data_.derivative_linear_velocity, data_.derivative_angular_velocity);
+  const auto ask_joints = [&] {
+    ask_discrepancies(data_.derivative_time, data_.derivative_position, data_.derivative_orientation,
+                      data_.derivative_linear_velocity, data_.derivative_angular_velocity);
+  };
+  ask_joints();
+  if (may_let_go(data_.discrepancies.columns()) && !ask_start_joints()) ask_joints();
   for (const auto& [body, curve] : model_.curves) {
     const Twist change = curve.at(data_.derivative_time[0]).change;
     set_vector(data_.kinematic_acceleration.span(), 2 * body, change.linear);
     set_vector(data_.kinematic_acceleration.span(), 2 * body + 1, change.angular);
   }
-  const DiscrepancyAnswer& joints = data_.discrepancies;
+  const DiscrepancyAnswer &joints = data_.discrepancies, &at_start = data_.start_joints;
   const auto request = [&](const Column<std::uint32_t>& block_body, const Column<double>& block) {
     return ids(model_.flags, model_.inverse_mass, model_.inertia, model_.inverse_inertia, model_.damping,
                data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
@@ -35,7 +40,9 @@ void Environment::ask_reactions() {
                joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes, joints.mode, joints.lower,
                joints.upper, joints.compliance, joints.damping, joints.maximum_force, block_body, block,
                front().position, front().orientation, start_linear_velocity(), start_angular_velocity(),
-               data_.time_step, joints.desired_acceleration);
+               data_.time_step, joints.desired_acceleration, at_start.point1, at_start.point2, at_start.velocity,
+               at_start.axes, at_start.mode, at_start.lower, at_start.upper, at_start.compliance, at_start.damping,
+               at_start.desired_acceleration);
   };
   data_.block_body.resize(0), data_.block.resize(0);
   data_.discrepancy_force.resize(3 * joints.mode.size());
@@ -53,34 +60,6 @@ void Environment::ask_reactions() {
                 most_reaction_blocks());
   // of this state alone: of others a run that is resumed would know nothing
   if (data_.block_body.size() == 0) data_.jacobian_body.resize(0), data_.jacobian.resize(0);
-}
-
-// What bodies do at the start, or an impulse gives them, joints may not allow: it jumps there and then, as by a solve at the
-// end of a step without length. Left to the end of the first step it would cost the method its order.
-void Environment::join_start_velocities() {
-  constexpr double kNoLength = 1e-12;  // of the step
-  const double length = data_.time_step[0];
-  data_.time_step[0] = kNoLength * length;
-  data_.trial_position.assign(front().position);
-  data_.trial_orientation.assign(front().orientation);
-  data_.trial_linear_velocity.assign(data_.start_linear_velocity);
-  data_.trial_angular_velocity.assign(data_.start_angular_velocity);
-  data_.trial_time[0] = data_.time[0];
-  follow_motion(data_.trial_time[0], data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
-                data_.trial_angular_velocity);
-  constrain(Validator::unchecked<Trusted<TrialState>>());
-  std::ranges::fill(data_.held_force.span(), 0.0);
-  solve();
-  start_impulse_.assign(data_.discrepancy_impulse.span().begin(), data_.discrepancy_impulse.span().end());
-  data_.start_linear_velocity.assign(data_.solved_linear_velocity);
-  data_.start_angular_velocity.assign(data_.solved_angular_velocity);
-  data_.time_step[0] = length;
-}
-
-// What joints bear as the step begins is part of what they bear in it, for those who ask.
-void Environment::add_start_impulses() {
-  if (start_impulse_.size() != data_.held_force.size()) return;
-  for (std::size_t i = 0; i < start_impulse_.size(); ++i) data_.held_force[i] += start_impulse_[i] / data_.time_step[0];
 }
 
 // A limit that bears holds like a lock while the step's end is solved, so that what the method is off by to its free side is put

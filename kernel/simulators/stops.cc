@@ -64,7 +64,7 @@ void Environment::find_stops(bool of_trial, std::vector<StopGap>* stops) const {
                     {vector_at(start_linear_velocity().span(), i), vector_at(start_angular_velocity().span(), i)},
                     is_pushed};
   };
-  const DiscrepancyColumns rows = data_.discrepancies.columns();
+  const DiscrepancyColumns rows = (of_trial ? data_.discrepancies : data_.start_joints).columns();
   for (std::size_t i = 0; i < rows.size(); ++i)
     for (const StopGap& stop :
          stop_gaps(rows.at(i), body(data_.discrepancy_body[2 * i]), body(data_.discrepancy_body[2 * i + 1])))
@@ -81,8 +81,7 @@ double Environment::next_stop(const Trusted<TrialState>& trial, double begin, do
   find_stops(true, &end_stops_);
   if (std::ranges::none_of(end_stops_, [&](const StopGap& stop) { return stop.may_have_closed(length); }))
     return length;
-  ask_discrepancies(data_.time, front().position, front().orientation, start_linear_velocity(),
-                    start_angular_velocity());
+  if (!ask_start_joints()) return length;
   find_stops(false, &start_stops_);
   if (start_stops_.size() != end_stops_.size()) return length;
   first_stops_ = start_stops_;

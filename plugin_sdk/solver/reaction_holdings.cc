@@ -23,31 +23,7 @@ double upper_limit(const Discrepancy& d, int axis) {
   return axis_mode(d.modes, axis) == AxisMode::kUnilateral ? kAny : d.upper[axis];
 }
 
-// True for an axis that holds in some states, by a force that it may not have in others.
-bool may_hold(const Discrepancy& d, int axis) {
-  const AxisMode mode = axis_mode(d.modes, axis);
-  if (mode == AxisMode::kFree || mode == AxisMode::kLocked || holds_always(d, axis) || acts_as_force(d, axis))
-    return false;
-  return is_drive(mode) == (d.maximum_force[axis] < kUnlimited);
-}
-
 }  // namespace
-
-// Of bars that are askew their cross carries the normal, and neither body does: an axis told in another state leans to the normal,
-// along which nothing turns. The lean is counted back. The normal is the direction that nothing turned about where it was told.
-double ReactionSolver::driven_rate(const Joint& joint, const Discrepancy& at_start) const {
-  const auto asked_turning = [&](std::uint32_t body) {
-    const std::uint32_t row = bodies_[body].row;
-    return row == kNone ? Vector3(Vector3::Zero()) : vector_at(request_->angular_velocity(), row);
-  };
-  const Vector3 asked = asked_turning(joint.body2) - asked_turning(joint.body1);
-  const Vector3 turning = bodies_[joint.body2].velocity.angular - bodies_[joint.body1].velocity.angular;
-  const SwingDirections told = swing_directions(joint.discrepancy), now = swing_directions(at_start);
-  const bool is_first = std::abs(told.first.dot(asked)) < std::abs(told.second.dot(asked));
-  const Vector3 axis = at_start.axes * Vector3::UnitX();
-  const double along = axis.dot(turning), leaned = axis.cross(is_first ? now.second : now.first).dot(turning);
-  return std::copysign(std::sqrt(along * along + leaned * leaned), along);
-}
 
 ReactionSolver::Holding ReactionSolver::held_always(const Discrepancy& d, int axis) {
   Holding holding;
@@ -80,7 +56,7 @@ void ReactionSolver::find_holdings() {
       if (!may_hold(d, axis)) continue;
       const Row row = row_of_axis(d, axes, axis, arms, joint);
       Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
-      holding = holding_at_start(joint, d, axis, row);
+      holding = holding_at_start(d, axis, row);
       may_let_go_ = may_let_go_ || holding.holds || holding.push != 0.0;
     }
   }
@@ -92,8 +68,7 @@ bool ReactionSolver::is_closed_limit(const Joint& joint, std::size_t axis) {
   return holding.holds && !holding.is_velocity && !holds_always(joint.discrepancy, static_cast<int>(axis));
 }
 
-// Without memory of the states before, each finds it anew. What ropes that roll off drums bear there is off by what they rolled:
-// whether they bear is for the state itself to say.
+// Without memory of the states before, each finds it anew.
 void ReactionSolver::let_go_from_start() {
   const auto has_closed = [](const Joint& joint) {
     return is_closed_limit(joint, 0) || is_closed_limit(joint, 1) || is_closed_limit(joint, 2);
@@ -111,8 +86,7 @@ void ReactionSolver::let_go_from_start() {
     Joint& joint = joints_[i];
     std::swap(joint.holdings, closed[i]);
     for (std::size_t axis = 0; axis < 3; ++axis)
-      if (is_closed_limit(joint, axis) && !closed[i][axis].holds && !joint.discrepancy.is_rolling())
-        joint.holdings[axis] = Holding{};
+      if (is_closed_limit(joint, axis) && !closed[i][axis].holds) joint.holdings[axis] = Holding{};
   }
 }
 
@@ -154,46 +128,35 @@ double ReactionSolver::strayed(const Row& row) const {
   return kOfSquare * turn * turn * row.reach + kRoundingOfRest * (row.reach + coordinates);
 }
 
-double ReactionSolver::rolled(const Joint& joint, const Discrepancy& at_start) const {
-  if (!at_start.is_rolling()) return 0.0;
-  const auto direction = [](const Discrepancy& d, const Quaternion& attitude) {
-    return Vector3((attitude.conjugate() * (d.point2 - d.point1)).normalized());
-  };
-  const Body& drum = bodies_[joint.body1];
-  return (direction(joint.discrepancy, drum.asked.orientation) - direction(at_start, drum.pose.orientation)).norm();
-}
-
 void ReactionSolver::turn_to_limit(Joint* joint) {
   const Discrepancy start = at_pose(*joint);
   const Twisting twisting = twisting_of(start);
-  const double turns = turns_to_limit(start), error = (twisting.angle + turns) * twisting.cosine();
-  if (turns == 0.0 || !may_hold(start, 0)) return;
-  if (std::fabs(error - start.lower.x()) <= kAtLimit || std::fabs(error - start.upper.x()) <= kAtLimit)
-    add_turns(turns, &joint->discrepancy);
+  const double turns = turns_to_limit(start), angle = twisting.angle + turns, error = angle * twisting.cosine();
+  if (!may_hold(start, 0)) return;
+  if (std::fabs(error - start.lower.x()) > kAtLimit && std::fabs(error - start.upper.x()) > kAtLimit) return;
+  if (is_at_start_) add_turns(turns, &joint->at_start);
+  const double since = angle - twisting_of(joint->discrepancy).angle;
+  add_turns(kWholeTurn * std::round(since / kWholeTurn), &joint->discrepancy);
 }
 
-ReactionSolver::Holding ReactionSolver::holding_at_start(const Joint& joint, const Discrepancy& d, int axis,
-                                                         const Row& row) const {
-  constexpr double kOfChange = 2.0;                   // of what it is asked for changes by in a step
-  constexpr double kOfCube = 0.25, kOfSquare = 0.75;  // of what a rope rolled; the first terms are a sixth and a half
+ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, int axis, const Row& row) const {
+  constexpr double kOfChange = 2.0;  // of what it is asked for changes by in a step
   const Body &one = bodies_[row.body1], &two = bodies_[row.body2];
   const Vector3 along = d.is_angular() ? Vector3(to_rotation_matrix(d.axes).col(axis)) : row.direction.linear;
   const double rate = row.direction.along(one.velocity, two.velocity) - along.dot(d.velocity);
-  const double speed = row.direction.size_along(one.velocity, two.velocity), roll = rolled(joint, d);
-  const double still = still_rate(speed) + kOfSquare * roll * roll * speed;
+  const double still = still_rate(row.direction.size_along(one.velocity, two.velocity));
   Holding holding;
   if (is_drive(axis_mode(d.modes, axis))) {
     const double bound = d.maximum_force[axis];
-    const double slip = d.is_swing() ? driven_rate(joint, d) - along.dot(d.velocity) : rate;
-    // the velocity that is asked for is that of the state, not of S_n
-    const double changed = kOfChange * request_->time_step() * std::abs(along.dot(d.acceleration));
+    // told in the state, it asks for another velocity than in S_n
+    const double changed = is_at_start_ ? 0.0 : kOfChange * request_->time_step() * std::abs(along.dot(d.acceleration));
     holding.is_velocity = true;
     holding.least = -bound, holding.most = bound;
-    holding.holds = std::abs(slip) <= still + changed && bound > 0.0;
-    if (!holding.holds) holding.push = std::copysign(bound, -slip), holding.missing = std::abs(slip);
+    holding.holds = std::abs(rate) <= still + changed && bound > 0.0;
+    if (!holding.holds) holding.push = std::copysign(bound, -rate), holding.missing = std::abs(rate);
     return holding;
   }
-  const double slop = (kAtLimit + kOfCube * roll * roll * roll) * (d.is_angular() ? 1.0 : row.reach);
+  const double slop = kAtLimit * (d.is_angular() ? 1.0 : row.reach);
   if (row.error <= lower_limit(d, axis) + slop && rate <= still) {
     holding.holds = true;
     if (axis_mode(d.modes, axis) != AxisMode::kUnilateral) holding.limit = &Discrepancy::lower;

@@ -39,6 +39,13 @@ bool holds_always(const Discrepancy& d, int axis) {
   }
 }
 
+bool may_hold(const Discrepancy& d, int axis) {
+  const AxisMode mode = axis_mode(d.modes, axis);
+  if (mode == AxisMode::kFree || mode == AxisMode::kLocked || holds_always(d, axis) || acts_as_force(d, axis))
+    return false;
+  return is_drive(mode) == (d.maximum_force[axis] < kUnlimited);
+}
+
 double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   request_ = &request;
   load_bodies();
@@ -167,15 +174,21 @@ void ReactionSolver::load_joints() {
                                    request_->maximum_force(),
                                    {},
                                    request_->desired_acceleration()};
+  const DiscrepancyColumns at_start{
+      request_->start_point1(),      request_->start_point2(),  request_->start_velocity(), request_->correction(),
+      request_->start_axes(),        request_->start_mode(),    request_->start_lower(),    request_->start_upper(),
+      request_->start_compliance(),  request_->start_damping(), request_->maximum_force(),  {},
+      request_->start_acceleration()};
   for (Joint& joint : joints_) {
     joint.discrepancy = columns.at(joint.place / 3);
+    if (tells_start()) joint.at_start = at_start.at(joint.place / 3);
     joint.is_only_point = is_only_point(request_->discrepancy_body(), request_->mode(), joint.place / 3);
     joint.holdings = {};
   }
 }
 
 void ReactionSolver::load_bodies() {
-  has_moved_ = false;
+  has_moved_ = is_at_start_ = false;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     Body& body = bodies_[i];
     const std::uint32_t row = body.row;
@@ -203,13 +216,15 @@ Twist ReactionSolver::start_velocity_of(const Body& body) const {
 }
 
 void ReactionSolver::go_to_start() {
+  is_at_start_ = tells_start();
+  has_moved_ = !is_at_start_;
   for (Body& body : bodies_) {
     body.pose = start_of(body), body.velocity = start_velocity_of(body);
+    if (is_at_start_) body.asked = body.pose;
     if (body.is_pushed())
       body.inverse_inertia =
           world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), body.row));
   }
-  has_moved_ = true;
 }
 
 void ReactionSolver::accelerate() {
@@ -293,16 +308,17 @@ void ReactionSolver::make_rows() {
 }
 
 const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
-  if (!has_moved_) return joint.discrepancy;
+  const Discrepancy& from = told(joint);
+  if (!has_moved_) return from;
   const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
   Discrepancy& d = carried_;
-  d = joint.discrepancy;
+  d = from;
   if (d.is_swing()) {
     const auto [first, second] = swing_directions(d);
     set_swing({one.pose.orientation * (one.asked.orientation.conjugate() * first),
                two.pose.orientation * (two.asked.orientation.conjugate() * second)},
               held_angle(d), &d);
-    const Vector3 then = joint.discrepancy.axes * Vector3::UnitX(), now = d.axes * Vector3::UnitX();
+    const Vector3 then = from.axes * Vector3::UnitX(), now = d.axes * Vector3::UnitX();
     d.velocity = then.dot(d.velocity) * now, d.acceleration = then.dot(d.acceleration) * now;
     return d;
   }

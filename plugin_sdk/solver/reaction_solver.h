@@ -20,6 +20,8 @@ namespace gravitas {
 
 // True where an axis of a discrepancy is held at all times by whatever force it takes.
 bool holds_always(const Discrepancy& discrepancy, int axis);
+// True for one that holds in some states, by a force that it may not have in others: limits, drives with a bound, friction.
+bool may_hold(const Discrepancy& discrepancy, int axis);
 
 class ReactionSolver {
  public:
@@ -43,7 +45,7 @@ class ReactionSolver {
     std::uint32_t row = kNone;  // of the request; none: the world
     double inverse_mass = 0.0;
     Matrix3 inverse_inertia = Matrix3::Zero();
-    Pose asked, pose;  // as the question has it, and where the joints agree
+    Pose asked, pose;  // as the question has it, and where the body is now
     Twist velocity, acceleration;
 
     bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
@@ -70,9 +72,9 @@ class ReactionSolver {
   struct Joint {
     std::size_t place = 0;  // of its first axis among the multipliers
     std::uint32_t body1 = 0, body2 = 0;
-    Discrepancy discrepancy;
-    bool is_only_point = false;  // joint_laws.h
-    std::size_t first_row = 0;   // of those that hold
+    Discrepancy discrepancy, at_start;  // at_start: where the request tells S_n's
+    bool is_only_point = false;         // joint_laws.h
+    std::size_t first_row = 0;          // of those that hold
     std::array<Holding, 3> holdings = {};
   };
 
@@ -127,12 +129,16 @@ class ReactionSolver {
   // In S_n.
   Pose start_of(const Body& body) const;
   Twist start_velocity_of(const Body& body) const;
+  // Bodies, and joints where the request tells them. load_bodies() leads back.
   void go_to_start();
   // What forces, springs, the gyroscopic term and drag make of the bodies.
   void accelerate();
   // Of one of the mechanism's own, by its row in the request; kNone for others.
   std::uint32_t place_of(std::uint32_t row) const;
   void load_joints();
+  bool tells_start() const { return !request_->start_mode().empty(); }
+  // The joint's discrepancy in the state that the bodies were taken from.
+  const Discrepancy& told(const Joint& joint) const { return is_at_start_ ? joint.at_start : joint.discrepancy; }
   // Which axes hold, in S_n (reaction_holdings.cc).
   void find_holdings();
   // A twist that began at its single limit is told by the turns that lead there.
@@ -145,12 +151,8 @@ class ReactionSolver {
   // By how much the row may be off in a state that an integrator tries: the second order of what turns in the step, and
   // rounding; m or rad.
   double strayed(const Row& row) const;
-  // By how much the leaving point of a rope went round a drum since S_n, where the bodies are, rad; 0 of what does not roll.
-  double rolled(const Joint& joint, const Discrepancy& at_start) const;
   static Holding held_always(const Discrepancy& d, int axis);
-  Holding holding_at_start(const Joint& joint, const Discrepancy& d, int axis, const Row& row) const;
-  // What a drive across two directions (joint_rows.h) turns at in S_n, where the bodies are, rad/s.
-  double driven_rate(const Joint& joint, const Discrepancy& at_start) const;
+  Holding holding_at_start(const Discrepancy& d, int axis, const Row& row) const;
   // The multipliers of the rows that hold. Returns what they are missed by.
   double solve_held();
   double find_multipliers();
@@ -239,7 +241,8 @@ class ReactionSolver {
   std::vector<Body> bodies_;   // its own, and then what holds it
   std::vector<Joint> joints_;  // in an order of elimination
   double longest_ = 0.0;       // reach of a row
-  bool has_moved_ = false;     // bodies, from where they were asked
+  bool has_moved_ = false;     // bodies, from where discrepancies are told
+  bool is_at_start_ = false;   // bodies and discrepancies are S_n's
   bool may_let_go_ = false;    // an axis that holds
   Discrepancy carried_;        // of at_pose()
   std::vector<Row> rows_;

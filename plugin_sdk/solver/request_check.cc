@@ -164,6 +164,20 @@ void check_reactions_request(const stage::SolverReactionsRequest& r) {
   check_unit("start_orientation", r.start_orientation(), bodies, 4);
   check_numbers("start_linear_velocity", r.start_linear_velocity(), bodies, 3);
   check_numbers("start_angular_velocity", r.start_angular_velocity(), bodies, 3);
+  if (!r.start_mode().empty()) check_length("start_mode", r.start_mode(), r.mode().size(), 1);
+  const std::size_t rows = r.start_mode().size();
+  check_numbers("start_point1", r.start_point1(), rows, 3);
+  check_numbers("start_point2", r.start_point2(), rows, 3);
+  check_numbers("start_velocity", r.start_velocity(), rows, 3);
+  check_unit("start_axes", r.start_axes(), rows, 4);
+  check_numbers("start_lower", r.start_lower(), rows, 3);
+  check_numbers("start_upper", r.start_upper(), rows, 3);
+  check_numbers("start_compliance", r.start_compliance(), rows, 3, 0.0);
+  check_numbers("start_damping", r.start_damping(), rows, 3, 0.0);
+  check_numbers("start_acceleration", r.start_acceleration(), rows, 3);
+  for (std::size_t row = 0; row < rows; ++row)
+    if (!is_valid_mode(r.start_mode()[row]))
+      refuse("start_mode", row, std::to_string(r.start_mode()[row]) + " is no mode");
   check_length("block_body", r.block_body(), r.block().size() / kBlockNumbers, 2);
   check_numbers("block", r.block(), r.block_body().size() / 2, kBlockNumbers);
   for (std::size_t i = 0; i < r.block_body().size(); ++i)

@@ -393,8 +393,6 @@ TEST(AxisModes, OtherCodesAreInvalid) {
   for (int bit = 14; bit < 32; ++bit) EXPECT_FALSE(is_valid_mode(1U << bit)) << bit;
   EXPECT_FALSE(is_valid_mode(kAngularDiscrepancy | kRadialDiscrepancy));
   EXPECT_FALSE(is_valid_mode(kRadialDiscrepancy | kSwingDiscrepancy));
-  EXPECT_TRUE(is_valid_mode(kRadialDiscrepancy | kRollingDiscrepancy | 0x002));
-  EXPECT_FALSE(is_valid_mode(kAngularDiscrepancy | kRollingDiscrepancy));
   EXPECT_FALSE(is_valid_mode(0x006) || is_valid_mode(0x060) || is_valid_mode(0x600));
 }
 

@@ -319,25 +319,45 @@ TEST(Hoist, WhoseRopeMayGoSlackMovesAsOneThatIsTaut) {
   const double a = kLoad * kG / (kLoad + kMoment / (kRadius * kRadius)), tight = kLoad * (kG - a);
   const Vector3 start(kRadius, -2, 0);
   for (const char* integrator : {"DormandPrince54", "RK4", "Radau", "SymplecticSplitting"})
-    for (const double aside : {0.0, 0.5}) {
+    for (const Vector3& aside : {Vector3(0, 0, 0), Vector3(0.5, 0, 0), Vector3(0.3, 0, 0.6)}) {
       std::uint32_t solutions[2];
       Vector3 ends[2];
       for (const bool is_taut : {true, false}) {
         Watched watched(
             scene(body("Drum", 1, kMoment, Vector3::Zero(), Vector3::Zero(), 0.0, false) +
-                      body("Load", kLoad, 0.01, start, Vector3(aside, 0, 0)),
+                      body("Load", kLoad, 0.01, start, aside),
                   bearing("Drum") + rope("R", "Drum", "Load", 1, kRadius, start, is_taut ? "Taut = true" : "")),
             {"Simulator=Smooth", "Solver=Direct", std::string("Integrator=") + integrator,
              set("Simulator.TimeStep", 1.0 / 60.0)});
         watched.run.to_end();
         ends[is_taut] = watched.run.body("Load").pose.position, solutions[is_taut] = solutions_of(&watched.run);
-        if (aside > 0.0) continue;
+        if (!aside.isZero(0.0)) continue;
         EXPECT_NEAR(ends[is_taut].y(), start.y() - 0.5 * a, 2e-6) << integrator << is_taut;
         EXPECT_NEAR(tension(watched, "R"), tight, 1e-4 * tight) << integrator << is_taut;
       }
-      EXPECT_LT((ends[0] - ends[1]).norm(), 1e-9) << integrator << aside;
-      EXPECT_LE(solutions[0], solutions[1] + solutions[1] / 10) << integrator << aside;
+      EXPECT_LT((ends[0] - ends[1]).norm(), 1e-9) << integrator << aside.transpose();
+      EXPECT_LE(solutions[0], solutions[1] + solutions[1] / 10) << integrator << aside.transpose();
     }
+}
+
+// A load that swings out of the plane of its drum, which it unwinds: energy is kept to the order of the method. What a rope that slants
+// bends beyond its row was left out: of first order, 5e-7 of the energy with any method.
+TEST(Hoist, WhoseRopeSlantsHasTheOrderOfTheIntegrator) {
+  const Vector3 start(0.2, -2, 0.4);
+  for (const char* kind : {"Taut = true", ""}) {
+    double errors[2];
+    for (int i = 0; i < 2; ++i) {
+      SceneRun run(
+          scene(body("Drum", 20, 0.4, Vector3::Zero(), Vector3::Zero(), 0.0, false) + body("Load", 10, 0.1, start),
+                bearing("Drum") + rope("R", "Drum", "Load", 1, 0.2, start, kind)),
+          {"Simulator=Smooth", "Solver=Direct", "Integrator=RK4", set("Simulator.Duration", 2),
+           set("Simulator.TimeStep", 0.01 / (1 << i))});
+      run.to_end();
+      errors[i] = run.report().energy().max_relative_drift();
+    }
+    EXPECT_LT(errors[1], 1e-6) << kind;
+    EXPECT_GT(errors[0] / errors[1], 15.0) << kind;
+  }
 }
 
 TEST(SwingingAtwood, IsThereWithEverySolver) {

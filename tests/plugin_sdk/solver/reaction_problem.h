@@ -76,7 +76,17 @@ class ReactionProblem {
             column(has_moved ? start_linear_velocity : linear_velocity),
             column(has_moved ? start_angular_velocity : angular_velocity),
             {&time_step, 1},
-            column(desired_acceleration)};
+            column(desired_acceleration),
+            column(start_point1),
+            column(start_point2),
+            column(start_velocity),
+            column(start_axes),
+            column(start_mode),
+            column(start_lower),
+            column(start_upper),
+            column(start_compliance),
+            column(start_damping),
+            column(start_acceleration)};
   }
 
   void solve() {
@@ -118,10 +128,19 @@ class ReactionProblem {
     start_linear_velocity = linear_velocity, start_angular_velocity = angular_velocity;
   }
 
+  // And what its joints are.
+  void tell_start_joints() {
+    start_point1 = point1, start_point2 = point2, start_velocity = velocity, start_axes = axes, start_mode = mode;
+    start_lower = lower, start_upper = upper, start_compliance = compliance, start_damping = damping;
+    start_acceleration = desired_acceleration;
+  }
+
   bool has_moved = false;
   double time_step = 0.01;
   std::vector<double> start_position, start_orientation, start_linear_velocity, start_angular_velocity;
-  std::vector<std::uint32_t> flags, discrepancy_body, mode, block_body;
+  std::vector<double> start_point1, start_point2, start_velocity, start_axes, start_lower, start_upper,
+      start_compliance, start_damping, start_acceleration;
+  std::vector<std::uint32_t> flags, discrepancy_body, mode, block_body, start_mode;
   std::vector<double> inverse_mass, inertia, inverse_inertia, drag, position, orientation, linear_velocity,
       angular_velocity, wrench, acceleration, point1, point2, velocity, correction, axes, lower, upper, compliance,
       damping, maximum_force, desired_acceleration, block;

@@ -20,6 +20,7 @@
 namespace gravitas {
 namespace {
 
+using ::testing::HasSubstr;
 using Problem = harness::ReactionProblem;
 
 constexpr double kG = 9.81;
@@ -298,6 +299,60 @@ TEST(Reactions, OfStopsAreThoseThatPress) {
     EXPECT_NEAR(problem.force(0).x(), 10.0 + std::max(0.0, -pull), 1e-12) << pull;
     EXPECT_NEAR(problem.force(1).x(), std::max(0.0, -pull), 1e-12) << pull;
   }
+}
+
+// By what the joints are told to be there, whatever those of the state would be if they were carried back: closed, in both.
+TEST(Reactions, OfStopsAreThoseThatWereClosedWhereTheStepBegan) {
+  for (const double gap : {0.0, 0.1})
+    for (const bool is_told : {false, true}) {
+      Problem problem;
+      problem.add_body(2.0, {0, 0, 0}, {0, 0, 0}, {-10, 0, 0});
+      Discrepancy stop;
+      stop.modes = pack_modes(AxisMode::kUnilateral, AxisMode::kFree, AxisMode::kFree);
+      problem.add_joint(kNone, 0, stop);
+      problem.begin_step();
+      if (is_told) problem.tell_start_joints(), problem.start_point2[0] = gap;
+      problem.solve();
+      EXPECT_EQ(problem.force(0).x(), is_told && gap > 0.0 ? 0.0 : 10.0) << gap << is_told;
+    }
+}
+
+// A drive of 3 N at most is at the speed that it was asked for there, though it is asked for another now.
+TEST(Reactions, OfDrivesAreOfTheSpeedThatWasAskedWhereTheStepBegan) {
+  for (const double asked : {1.0, 2.0}) {
+    Problem problem;
+    problem.add_body(2.0, {0, 0, 0}, {1, 0, 0}, {-2, 0, 0});
+    Discrepancy drive;
+    drive.modes = pack_modes(AxisMode::kDriven, AxisMode::kFree, AxisMode::kFree);
+    drive.maximum_force.x() = 3.0, drive.velocity.x() = 1.5;
+    problem.add_joint(kNone, 0, drive);
+    problem.begin_step();
+    problem.tell_start_joints();
+    problem.start_velocity[0] = asked;
+    problem.solve();
+    EXPECT_NEAR(problem.force(0).x(), asked == 1.0 ? 2.0 : 3.0, 1e-12) << asked;
+  }
+}
+
+TEST(Reactions, RefuseJointsOfTheStartThatAreNone) {
+  const auto refusal_with = [](auto&& spoil) {
+    Problem problem;
+    problem.add_body(2.0, {0, 0, 0}, {0, 0, 0}, {-10, 0, 0});
+    problem.add_joint(kNone, 0, pin({0, 0, 0}));
+    problem.tell_start_joints();
+    spoil(&problem);
+    try {
+      problem.solve();
+    } catch (const Refusal& refusal) {
+      return std::string(refusal.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal_with([](Problem*) {}), "");
+  EXPECT_THAT(refusal_with([](Problem* one) { one->start_mode.push_back(0x111); }), HasSubstr("start_mode"));
+  EXPECT_THAT(refusal_with([](Problem* one) { one->start_mode[0] = 7; }), HasSubstr("start_mode"));
+  EXPECT_THAT(refusal_with([](Problem* one) { one->start_lower.pop_back(); }), HasSubstr("start_lower"));
+  EXPECT_THAT(refusal_with([](Problem* one) { one->start_point1[1] = std::nan(""); }), HasSubstr("start_point1"));
 }
 
 // Of one body at the origin that moves at (0.5, 0, 0) and is off by `error` along x; only that axis is said to do anything.

@@ -77,6 +77,37 @@ TEST_F(OnADrum, RowsAreTheRatesOfTheErrors) {
   }
 }
 
+// Second derivatives of what is too long, while it is not: those of the row, whose x1 goes along with the drum, and what is told.
+TEST_F(OnADrum, AccelerationsAreThoseOfTheErrors) {
+  constexpr double kTime = 1e-4;
+  int tried = 0;
+  for (int i = 0; i < 60; ++i) {
+    JointProblem joint(&plugin_, "Winch");
+    const Vector3 start = random_.vector(0.6);
+    if (std::hypot(start.x(), start.y()) < kDrumRadius + 0.05) continue;
+    joint.bodies[1].pose.position = start;
+    joint.bind(properties(start + Vector3(0, 0, 1e-3), 0.0, true));
+    for (JointedBody& body : joint.bodies) body.twist = {random_.vector(1.0), random_.vector(1.0)};
+    Discrepancy d = joint.describe().at(0);
+    const Vector3 along = d.axes * Vector3::UnitX();
+    joint.bodies[1].twist.linear -= joint.row_velocity(d, along) * along;
+    d = joint.describe().at(0);
+    const std::vector<JointedBody> now = joint.bodies;
+    const auto at = [&](double time) {
+      for (std::size_t b = 0; b < 2; ++b)
+        joint.bodies[b].pose = displaced(now[b].pose, time * now[b].twist.linear, time * now[b].twist.angular);
+      const double of_row =
+          (carried(d.point2, now[1].pose, joint.bodies[1].pose) - carried(d.point1, now[0].pose, joint.bodies[0].pose))
+              .norm();
+      return Vector3(error(joint.describe().at(0)), of_row, 0);
+    };
+    const Vector3 second = (at(kTime) - 2.0 * at(0.0) + at(-kTime)) / (kTime * kTime);
+    EXPECT_NEAR(second[0], second[1] - along.dot(d.acceleration), 2e-6 * (1.0 + std::fabs(second[0]))) << i;
+    ++tried;
+  }
+  EXPECT_GT(tried, 20);
+}
+
 TEST_F(OnADrum, TheStepTellsTheTurn) {
   constexpr double kTurn = 2.0 * std::numbers::pi * kDrumRadius;
   const Vector3 end(kDrumRadius, -3, 0);

@@ -20,10 +20,9 @@
 // Freedoms. One one-sided row, rank 1 while taut: along the gradient of e by P as body 1 sees it. With z = k.(P - c), l the length
 // across k and R = |P - c| there,
 //   grad e = u - (1 - l/L) R/l (R)^ + z/L k,   which has the torque r about k, and is u in the plane of the drum.
-// There it has e to the second order, too: the row is radial (discrepancy.h), about a point at the distance L behind P, where rope
-// and involute have their centre. `Smooth` carries rows from its stages to where the step began, off by a third order of its turns,
-// which it knows of them (kRollingDiscrepancy). Where ropes slant all this is so to the second order of the slant; the groove bears
-// the rest.
+// The row is radial (discrepancy.h), about a point at the distance L behind P, where rope and involute have their centre. In the plane
+// of the drum it has e to the second order, too; what e curves otherwise where ropes slant is told as an acceleration (bend()). The
+// groove bears what slanting ropes ask for along k.
 // With a stiffness it is a spring and a damper, as a `Distance`.
 //
 // Where P comes into the drum (R < r) all is wound up, L = 0, and the rope pulls about the axis, along n x k with n towards P; on the
@@ -44,7 +43,7 @@ namespace {
 // How the rope lies: n, the gradient of e by P, L. Its end is outside of the drum, or all of it is wound up.
 struct Rope {
   Vector3 normal = Vector3::Zero(), gradient = Vector3::Zero();
-  double length = 0.0;
+  double length = 0.0, across = 0.0;  // L, l
   bool is_free = false;
 };
 
@@ -135,7 +134,13 @@ class Winch final : public ConstraintPlugin {
                               .velocity(bodies.velocity1, bodies.spin1, bodies.velocity2, bodies.spin2);
       const double error = in_its_turn(rope.length - paid_out - radius * math::atan2(seen.z(), seen.y()), made,
                                        kWholeTurn * radius, is_symmetric);
-      if (rope.is_free) d.modes |= kRadialDiscrepancy | kRollingDiscrepancy;
+      if (rope.is_free) {
+        d.modes |= kRadialDiscrepancy;
+        const Vector3 far = end - bodies.pose1.position;
+        const Vector3 moving = bodies.velocity2 + bodies.spin2.cross(end - bodies.pose2.position) - bodies.velocity1 -
+                               bodies.spin1.cross(far);
+        d.acceleration = -bend(rope, drum.orientation * Vector3::UnitX(), radius, end - drum.position, moving) * along;
+      }
       d.upper.x() = rope.length - error / steepness;
       d.lower.x() = is_taut ? d.upper.x() : -kUnlimited;
       if (spring.stiffness > 0.0) d.compliance.x() = 1.0 / (spring.stiffness * steepness * steepness);
@@ -157,12 +162,29 @@ class Winch final : public ConstraintPlugin {
     if (far == 0.0) return {};
     const Vector3 outward = across / far, round = outward.cross(axis);
     const double length = std::sqrt(std::max(0.0, far - radius) * (far + radius));
-    if (!(length > kLeastLength * radius)) return {outward, radius / far * round, 0.0, false};
+    if (!(length > kLeastLength * radius)) return {outward, radius / far * round, 0.0, 0.0, false};
     const double whole = std::sqrt(length * length + beside * beside);
     const double cosine = radius / far, sine = length / far;
     const Vector3 tangent = sine * outward + cosine * round;
     return {cosine * outward - sine * round, tangent - (1.0 - length / whole) / sine * outward + beside / whole * axis,
-            whole, true};
+            whole, length, true};
+  }
+
+  // What the velocity of P, as the drum sees it, makes of e'' along the row, beyond what it makes of the row's, m/s^2. With R and round as
+  // lying() has them, P at (R, z) and moving by (a, b, c) along R^, k x R^ and k:
+  //   d2e = (1/L - R^2/L^3 + r^2 (l^2 + R^2)/(R^2 l^3)) a^2 - 2 R z/L^3 a c + l^2/L^3 c^2 + (1/L - r^2/(R^2 l)) b^2 + 2 r/R^2 a b
+  static double bend(const Rope& rope, const Vector3& axis, double radius, const Vector3& way, const Vector3& moving) {
+    const double beside = axis.dot(way), whole = rope.length, length = rope.across;
+    const Vector3 across = way - beside * axis;
+    const double far = across.norm(), steepness = rope.gradient.norm();
+    const double a = across.dot(moving) / far, b = axis.cross(across).dot(moving) / far, c = axis.dot(moving);
+    const double cube = whole * whole * whole, of_drum = radius / far * (radius / far);
+    const double out =
+        (beside - radius) * (beside + radius) / cube + of_drum * (1.0 + far / length * (far / length)) / length;
+    const double bent = out * a * a - 2.0 * far * beside / cube * a * c + length * length / cube * c * c +
+                        (1.0 / whole - of_drum / length) * b * b + 2.0 * of_drum / radius * a * b;
+    const double along = rope.gradient.dot(moving) / steepness;
+    return bent / steepness - (moving.squaredNorm() - along * along) / whole;
   }
 
   // Of error + k period what the step made: see the head. What is off a rigid rope by more than an integrator leaves of
