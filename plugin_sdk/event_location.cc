@@ -32,6 +32,16 @@ double accelerated_time(const Encounter& encounter, double acceleration, double 
   return std::max(time, speed <= 0.0 ? 2.0 * way / (root - speed) : (speed + root) / -acceleration);
 }
 
+// How long a trial is that presses a touching pair together by no more than it may.
+double pressed_time(const Encounter& encounter, double acceleration, double length, double shortest_flight) {
+  constexpr double kShortest = 1e3;  // shortest flights
+  const double speed = encounter.start_speed, most = encounter.most_pressed;
+  if (!(-0.5 * (speed + encounter.end_speed) * length > most)) return length;
+  const double root = std::sqrt(speed * speed - 2.0 * acceleration * most);
+  const double time = speed <= 0.0 ? 2.0 * most / (root - speed) : (speed + root) / -acceleration;
+  return std::min(length, std::max(time, kShortest * shortest_flight));
+}
+
 }  // namespace
 
 NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight) {
@@ -39,6 +49,8 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
   const double time = encounter.fraction * length;
   // what detectors and solvers do not tell from touching
   const double near = std::max(encounter.slop, target_gap);
+  const double pressed =
+      encounter.is_touching ? pressed_time(encounter, acceleration, length, shortest_flight) : length;
   const bool comes_back = encounter.start_speed > 0.0 && encounter.end_speed < 0.0;
   const double top = comes_back ? encounter.start_speed / -acceleration : 0.0;
   if (encounter.fraction <= 0.0 && (!comes_back || 2.0 * top > shortest_flight))
@@ -46,13 +58,13 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
   if (comes_back && top >= time) {
     const bool rests =
         2.0 * top <= shortest_flight || 0.5 * encounter.start_speed * top <= std::max(target_gap, encounter.left_gap);
-    if (rests) return {length};
+    if (rests) return {pressed};
     // what turns may come back before
     return {std::min(length, top), encounter.fraction > 0.0};
   }
   if (encounter.fraction <= 0.0) {
     const double closing = -encounter.start_speed;
-    if (encounter.is_touching || encounter.gap < -kMostUnseen * near || closing <= 0.0) return {length};
+    if (encounter.is_touching || encounter.gap < -kMostUnseen * near || closing <= 0.0) return {pressed};
     return {std::min(length, (std::fabs(encounter.gap) + 2.0 * target_gap) / closing), false, true};
   }
   const double closing = -(encounter.start_speed + acceleration * time);

@@ -81,7 +81,10 @@ NextStop Environment::first_impact(const Trusted<TrialState>& trial, double begi
       }
       if (met.fraction <= 0.0) {
         met.turning_speed = turning_speed(pair);
-        met.harmless_depth = harmless_depth(model_.bound[pair[0]], model_.bound[pair[1]]);
+        const LocalBound &one = model_.bound[pair[0]], &two = model_.bound[pair[1]];
+        met.harmless_depth = harmless_depth(one, two);
+        // what is unbounded has no other side
+        if (one.reach > 0.0 && two.reach > 0.0) met.most_pressed = met.harmless_depth;
         if (met.turning_speed * left > met.harmless_depth)
           met.bounce_speed = !met.is_touching ? met.start_speed : inner_ > 0 ? bounce_speed(pair) : 0.0;
       }

@@ -274,5 +274,24 @@ TEST(Slide, OfManyContactsCountsEachByItsFriction) {
   EXPECT_NEAR(slide.end(1.0), 0.25, 1e-15);
 }
 
+// Pressed by 100 m/s^2 from rest, from an approach and while it parts: where s t + a t^2/2 = -most, if the trial comes so far.
+TEST(Events, WhatIsPressedEndsBeforeItIsPressedThrough) {
+  constexpr double kLength = 0.02, kMost = 5e-4, kAcceleration = 100.0;
+  for (const double speed : {0.0, -0.05, 1e-7}) {
+    Encounter pressed{0.0, 0.0, speed, speed - kAcceleration * kLength, 0.0, true};
+    pressed.left_gap = 1e-6;
+    EXPECT_EQ(stop_before(pressed, kLength, kTargetGap, kShortestFlight).length, kLength) << speed;
+    pressed.most_pressed = kMost;
+    const NextStop stop = stop_before(pressed, kLength, kTargetGap, kShortestFlight);
+    EXPECT_NEAR(speed * stop.length - 0.5 * kAcceleration * stop.length * stop.length, -kMost, 1e-15) << speed;
+    EXPECT_FALSE(stop.is_trial);
+    pressed.most_pressed = 1.0;
+    EXPECT_EQ(stop_before(pressed, kLength, kTargetGap, kShortestFlight).length, kLength) << speed;
+    // however thin: some steps, not any number of them
+    pressed.most_pressed = 1e-12;
+    EXPECT_GE(stop_before(pressed, kLength, kTargetGap, kShortestFlight).length, 1e3 * kShortestFlight) << speed;
+  }
+}
+
 }  // namespace
 }  // namespace gravitas
