@@ -78,10 +78,11 @@ class Run final : private kernel::CommitListener {
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
     read_edits(resumed ? &*resumed : nullptr);
     read_orders();
-    edits_.rehearse(options_, scene_, description_, &catalog_, {swaps_, comparisons_, faults_});
+    edits_.rehearse(options_, scene_, description_, &catalog_);
     read_kinds();
     Answering answering{description_, description_};
     if (resumed) apply_decisions(*resumed, &answering);
+    edits_.require_slots({swaps_, comparisons_, faults_});
     require_workers(answering.now);
     environment_ = start(answering.begun, starter(), &scene_);
     if (!options_.instrumentation.empty() || !options_.joints.empty()) survey_.emplace(answering.now, options_.starter);
@@ -92,7 +93,7 @@ class Run final : private kernel::CommitListener {
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed, answering.now);
     for (const RerunSpec& rerun : reruns_) require_rerun(rerun, *environment_);
-    give_orders();
+    give_orders(description_, &*environment_);
     warn_of_orders_beyond_the_end();
   }
 
@@ -338,6 +339,7 @@ class Run final : private kernel::CommitListener {
     EditedScene::Successor next = edited.succeed(*environment_, begun, catalog_, starter(), &decisions);
     edited.look_at_limits(active, *environment_, begun, *next.environment);
     const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next.environment);
+    give_orders(edited.description(), &*next.environment);
     for (const std::string& warning : edited.warnings())
       if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
     for (const auto& [a, b] : next.parted)
@@ -353,20 +355,19 @@ class Run final : private kernel::CommitListener {
     environment_ = std::move(next.environment);
     edits_.note(*edit);
     note_edit(*edit, &result_.report);
+    attend();
     if (recorder_) recorder_->set_decisions(decisions_);
+    // before all that may fail in the new environment
+    if (recorder_) recorder_->note_edit(*edit);
     if (event_source_) event_source_->begin_again(*environment_);
     if (trajectory_) trajectory_->follow(description_);
     if (reactions_) reactions_->begin_again();
     if (survey_) survey_->begin_again(begun);
-    attend();
     figures_->begin_again(environment_.get());
-    give_orders();
     tell({EventKind::kEdit, environment_->step_count(), environment_->time()},
          fmt::format("{} before step {}", counted(edit->changes_size(), "change"), edit->step()));
     for (const std::uint32_t body : woken)
       tell({EventKind::kWake, environment_->step_count(), environment_->time(), body}, "");
-    // last, as the edit is made: a disk may be full
-    if (recorder_) recorder_->note_edit(*edit);
   }
 
   void attend() {
@@ -391,22 +392,22 @@ class Run final : private kernel::CommitListener {
   }
 
   // Those of steps up to the next edit; after it another environment gets the rest.
-  void give_orders() {
-    const std::uint32_t made = environment_->step_count();
+  void give_orders(const kernel::EnvironmentDescription& description, kernel::Environment* world) {
+    const std::uint32_t made = world->step_count();
     const auto is_due = [&](std::uint32_t step) {
       return (made == 0 || step > made) && (edits_.to_come().empty() || step < edits_.to_come().front().step());
     };
     try {
       for (const kernel::SwapOrder& order : swaps_)
-        if (is_due(order.step)) environment_->order_swap(order);
+        if (is_due(order.step)) world->order_swap(order);
       // after an edit they are counted anew
       for (kernel::SwapOrder& order : comparisons_) {
         if (made > 0) order.step = made + 1;
-        environment_->order_swap(order, true);
+        world->order_swap(order, true);
       }
       for (const kernel::FaultInjection& fault : faults_)
-        if (is_due(fault.step)) order_fault(fault, description_, swaps_, &*environment_);
-      for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);
+        if (is_due(fault.step)) order_fault(fault, description, swaps_, world);
+      for (const RerunSpec& rerun : reruns_) world->set_rerun_every(rerun.slot, rerun.every);
     } catch (const std::invalid_argument& problem) {
       throw BadInput(problem.what());
     }

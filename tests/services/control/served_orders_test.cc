@@ -127,6 +127,32 @@ TEST(ServedOrders, TheCommandThatGoesOnHasThem) {
   EXPECT_THAT(served.client.status().last_warning(), Not(HasSubstr("what was set")));
 }
 
+// As by the server, which would have refused it, too.
+TEST(ServedOrders, AnEditThatLeavesOutTheirSlotIsRefusedBeforeTheRunGoesOn) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  {
+    Served served(options);
+    served.client.swap(parse_swap_request("constraint=AngularMotor@step=60"));
+    served.client.step(10);
+  }
+  options.run.resume = options.run.checkpoint;
+  options.run.checkpoint.clear();
+  options.run.edits = {"remove Constraint.MyAngularMotor@step=60"};
+  std::string problem;
+  try {
+    harness::run_quietly(options.run);
+  } catch (const BadInput& refused) {
+    problem = refused.what();
+  }
+  EXPECT_THAT(problem, HasSubstr("swap constraint=AngularMotor at step 60: after the edit before step 60 the plan "
+                                 "leaves the slot out: "));
+  // before that edit it is there
+  options.run.edits = {"remove Constraint.MyAngularMotor@step=61"};
+  EXPECT_EQ(harness::run_quietly(options.run).report.swaps_size(), 1);
+}
+
 TEST(ServedOrders, ACaptureWritesOverNoCheckpoint) {
   const gravitas::harness::ScratchFolder folder;
   ServeOptions options = sample("direct");
