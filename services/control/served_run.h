@@ -37,6 +37,7 @@
 #include "services/recorder/recorder.h"
 #include "services/run/figures.h"
 #include "services/run/interruptible_host.h"
+#include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/session.h"
 #include "services/survey/instrumentation.h"
@@ -192,6 +193,8 @@ class ServedRun final : private kernel::CommitListener {
   api::Status status_now();
   void write_plan(api::Plan* plan) const;
   std::vector<api::ServedSwap> swap_messages() const;
+  // What a checkpoint keeps of the report.
+  recorder::v1::Tally tally() const { return tally_of(*environment_, {}, past_, *figures_, *events_); }
   api::ServedSwap swap_message(const Order& order, const std::vector<kernel::SwapRecord>& records) const;
   // With those of before the last edit.
   std::vector<Order> pending_orders() const;
@@ -220,7 +223,7 @@ class ServedRun final : private kernel::CommitListener {
   const kernel::EnvironmentDescription first_description_;
   kernel::EnvironmentDescription description_;
   kernel::EnvironmentDescription active_;  // its slots alone: who answers, with which settings
-  // Faults and swaps of environments before the last edit; the edits.
+  // Faults and swaps of environments before the last edit, and swaps of the checkpoint; the edits.
   report::v1::Report past_;
   std::vector<api::ServedSwap> past_swaps_;
 

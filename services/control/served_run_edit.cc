@@ -83,8 +83,10 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     std::erase_if(swaps, [&](const api::ServedSwap& one) {
       return std::ranges::find(pending, one.number(), &Order::number) != pending.end();
     });
+    *past_.mutable_swaps() = tally().swaps();
     for (const kernel::SwapRecord& swap : successor.settled) {
       renew_swap(swap, &swaps, static_cast<int>(swaps.size()));
+      renew_swap(swap, past_.mutable_swaps(), past_.swaps_size());
       tell(swap_event(*environment_, swap));
     }
     past_swaps_ = std::move(swaps);

@@ -482,11 +482,7 @@ class Run final : private kernel::CommitListener {
 
   // What the report counts, for a checkpoint.
   recorder::v1::Tally tally() const {
-    recorder::v1::Tally tally = resumed_tally_;
-    figures_->write(&tally);
-    write_swaps(*environment_, taken_over_, result_.report, &tally);
-    if (events_) events_->write(&tally);
-    return tally;
+    return tally_of(*environment_, taken_over_, result_.report, *figures_, *events_);
   }
 
   // Listens if there is something to keep or to compare.
