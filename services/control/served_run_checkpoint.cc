@@ -177,7 +177,7 @@ std::string ServedRun::command_to_resume() {
     const std::vector<kernel::PluginChoice>& own = description_.slot(slot).plugins;
     const auto same = std::ranges::find(own, plugin.declaration.name,
                                         [](const kernel::PluginChoice& choice) { return choice.declaration.name; });
-    if (same != own.end() && !have_same_settings(*same, plugin))
+    if (same != own.end() && !recorder_->keeps() && !have_same_settings(*same, plugin))
       add_warning(fmt::format("settings of {} for step {} are not part of the command that goes on: it has the scene's",
                               plugin.declaration.name, step));
   }

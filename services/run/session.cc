@@ -269,28 +269,12 @@ class Run final : private kernel::CommitListener {
   // Whoever answered when the checkpoint was made answers again; what the journal knows of later steps is ordered for
   // them. Swaps of the command line up to the checkpoint are done, or were refused.
   void apply_decisions(const Resumption& resumed, Answering* answering) {
-    const std::uint32_t step = resumed.checkpoint.step();
     warn_of_unknown_swaps(swaps_, resumed.checkpoint, &warnings_);
-    // one of a step that was not made is in the checkpoint already
-    const auto is_restored = [&](const kernel::SwapOrder& one) { return has_made(resumed.checkpoint, one); };
-    std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step || is_restored(one); });
     from_checkpoint(options_.resume, [&] {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
       *answering = answering_at(resumed.checkpoint, description_, catalog_);
-      const auto order_again = [&](kernel::SwapOrder order) {
-        const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
-          return one.slot == order.slot && one.step == order.step &&
-                 one.plugin.declaration.name == order.plugin.declaration.name &&
-                 have_same_settings(one.plugin, order.plugin);
-        });
-        if (is_ordered || is_restored(order)) return false;
-        swaps_.push_back(std::move(order));
-        return true;
-      };
-      for (const auto& decision : resumed.journal.decisions)
-        if (order_again(order_of(decision, catalog_)) && decision.why() != "swap")
-          note_takeover(decision, &taken_over_, &warnings_);
-      for (LiveOrder& one : orders_to_come(resumed, catalog_, &warnings_)) order_again(std::move(one.swap));
+      const std::vector<LiveOrder> live = orders_to_come(resumed, catalog_, &warnings_);
+      swaps_ = swaps_to_come(resumed, std::move(swaps_), live, catalog_, &taken_over_, &warnings_);
     });
     // how far hosting may differ is for the command line to say
     for (auto* one : {&answering->now, &answering->begun}) apply_hosting(options_.hosting, one);

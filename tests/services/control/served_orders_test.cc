@@ -153,6 +153,34 @@ TEST(ServedOrders, AnEditThatLeavesOutTheirSlotIsRefusedBeforeTheRunGoesOn) {
   EXPECT_EQ(harness::run_quietly(options.run).report.swaps_size(), 1);
 }
 
+// The command that goes on has the scene's settings, the journal those that were set.
+TEST(ServedOrders, ASwapOfTheCommandAndTheJournalIsMadeOnce) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  const auto begin = [](Served* one) {
+    one->client.set_property(parse_set_request("Solver.Iterations=3"));
+    one->client.step(10);
+    one->client.swap(parse_swap_request("solver=Sequential@step=60"));
+    one->run.save_checkpoint();
+  };
+  Served quiet(sample("direct"));
+  begin(&quiet);
+  const std::string chain = quiet.to_the_end().chain_hash();
+  {
+    Served served(options);
+    begin(&served);
+  }
+  RunOptions again = sample("direct").run;
+  again.resume = options.run.checkpoint;
+  again.swaps = {"solver=Sequential@step=60"};
+  const RunResult result = harness::run_quietly(again);
+  EXPECT_EQ(result.report.chain_hash(), chain);
+  std::vector<std::uint32_t> steps;
+  for (const report::v1::SwapRecord& swap : result.report.swaps()) steps.push_back(swap.step());
+  EXPECT_THAT(steps, ::testing::ElementsAre(1, 60));
+}
+
 TEST(ServedOrders, ACaptureWritesOverNoCheckpoint) {
   const gravitas::harness::ScratchFolder folder;
   ServeOptions options = sample("direct");
