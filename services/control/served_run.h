@@ -166,13 +166,15 @@ class ServedRun final : private kernel::CommitListener {
   // It begins, or has ended.
   void note_step(std::optional<Clock::time_point> begin);
   void make_step();
-  void keep_checkpoint(const JournalReading& known);
+  void keep_checkpoint(JournalReading known);
   void keep_faulted_state();
   void close_capture();
   Clock::time_point due() const;
   void require_steps_left(const std::string& what) const;
   std::uint32_t next_step(const std::string& what, std::uint32_t wanted) const;
   api::SwapOrdered order(kernel::SwapOrder order, OrderKind kind);
+  // As a journal has it, but for comparisons.
+  static recorder::v1::Decision order_message(const Order& order);
   // In the journal, but for comparisons: ordered, or called off.
   void note(const Order& order, bool is_called_off);
   const kernel::PluginChoice& choice_with(const std::string& what, Slot slot, const std::string& property,

@@ -125,7 +125,7 @@ std::vector<LiveOrder> orders_to_come(const Resumption& resumed, const Catalog& 
   for (const recorder::v1::Decision& one : resumed.journal.orders) {
     if (one.step() <= std::max(resumed.journal.last_step, resumed.checkpoint.step())) continue;
     try {
-      LiveOrder order{ordered_swap(one, catalog), one.why() == kOrderOfSetting};
+      LiveOrder order{ordered_swap(one, catalog), one};
       if (!has_made(resumed.checkpoint, order.swap)) orders.push_back(std::move(order));
     } catch (const std::runtime_error& problem) {
       warnings->push_back(
@@ -152,9 +152,8 @@ std::vector<kernel::SwapOrder> swaps_to_come(const Resumption& resumed, std::vec
                                              std::vector<std::string>* warnings) {
   // one of a step that was not made is in the checkpoint already
   const auto is_restored = [&](const kernel::SwapOrder& one) { return has_made(resumed.checkpoint, one); };
-  std::erase_if(named, [&](const kernel::SwapOrder& one) {
-    return one.step <= resumed.checkpoint.step() || is_restored(one);
-  });
+  std::erase_if(
+      named, [&](const kernel::SwapOrder& one) { return one.step <= resumed.checkpoint.step() || is_restored(one); });
   std::vector<kernel::SwapOrder> known;
   // false if it is ordered already, or by the command line, too
   const auto order_again = [&](kernel::SwapOrder order) {

@@ -31,7 +31,7 @@ bool has_made(const recorder::v1::Checkpoint& checkpoint, const kernel::SwapOrde
 // A swap that was ordered while the run was served, and is still to come.
 struct LiveOrder {
   kernel::SwapOrder swap;
-  bool is_setting;  // that was changed
+  recorder::v1::Decision known;  // as the journal has it
 };
 // Those that the journal knows for steps that it does not know. One whose plugin is not to be had is warned of.
 std::vector<LiveOrder> orders_to_come(const Resumption& resumed, const Catalog& catalog,

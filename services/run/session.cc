@@ -274,6 +274,7 @@ class Run final : private kernel::CommitListener {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
       *answering = answering_at(resumed.checkpoint, description_, catalog_);
       const std::vector<LiveOrder> live = orders_to_come(resumed, catalog_, &warnings_);
+      for (const LiveOrder& one : live) live_orders_.push_back(one.known);
       swaps_ = swaps_to_come(resumed, std::move(swaps_), live, catalog_, &taken_over_, &warnings_);
     });
     // how far hosting may differ is for the command line to say
@@ -478,10 +479,10 @@ class Run final : private kernel::CommitListener {
     recorder_->set_decisions(decisions_);
     if (options_.listener) recorder_->note_listener();
     if (checkpoint_path_.empty()) return;
+    // that of another file begins with what is still to come
+    if (!goes_on_in_its_checkpoint(options_)) journal_ = {.orders = live_orders_};
     try {
-      // the journal of another file starts anew
-      recorder_->keep(checkpoint_path_, options_.checkpoint_every,
-                      goes_on_in_its_checkpoint(options_) ? journal_ : journal_.anew(), *environment_);
+      recorder_->keep(checkpoint_path_, options_.checkpoint_every, journal_, *environment_);
     } catch (const std::system_error& error) {
       if (is_disk_error(error.code())) throw;
       throw BadInput(error.what());
@@ -509,6 +510,7 @@ class Run final : private kernel::CommitListener {
   std::vector<kernel::FaultInjection> faults_;
   std::vector<RerunSpec> reruns_;
   std::vector<recorder::v1::Decision> decisions_, taken_over_;  // in force; in the journal, and no swaps
+  std::vector<recorder::v1::Decision> live_orders_;             // of the journal, still to come
   std::optional<PairDecisions> pair_decisions_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;

@@ -181,6 +181,40 @@ TEST(ServedOrders, ASwapOfTheCommandAndTheJournalIsMadeOnce) {
   EXPECT_THAT(steps, ::testing::ElementsAre(1, 60));
 }
 
+// One whose plugin is not to be had is told once, and is none of a journal that is begun then.
+TEST(ServedOrders, AJournalThatIsBegunAnewHasThoseThatStand) {
+  const gravitas::harness::ScratchFolder folder;
+  const std::string copy = folder.path("copy.so");
+  std::filesystem::copy(in_build("/lib/gravitas/solver_newton.so"), copy);
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  {
+    Served served(options);
+    served.client.swap(parse_swap_request("solver=" + copy + "@step=50"));
+    served.client.swap(parse_swap_request("integrator=RK4@step=60"));
+  }
+  ServeOptions again = sample("direct");
+  again.run.resume = options.run.checkpoint;
+  again.run.checkpoint = folder.path("by_serve.ck");
+  { const Served resumed(again); }
+  again.run.checkpoint = folder.path("by_run.ck");
+  EXPECT_THAT(harness::run_quietly([&] {
+                RunOptions some = again.run;
+                some.steps = 10;
+                return some;
+              }())
+                  .report.warnings(),
+              ::testing::Contains(HasSubstr("is not ordered again")));
+  for (const char* kept : {"by_serve.ck", "by_run.ck"}) {
+    RunOptions rest = sample("direct").run;
+    rest.resume = folder.path(kept);
+    const RunResult result = harness::run_quietly(rest);
+    EXPECT_THAT(result.report.warnings(), Not(::testing::Contains(HasSubstr("is not ordered again")))) << kept;
+    ASSERT_EQ(result.report.swaps_size(), 1) << kept;
+    EXPECT_EQ(result.report.swaps(0).step(), 60U) << kept;
+  }
+}
+
 TEST(ServedOrders, ACaptureWritesOverNoCheckpoint) {
   const gravitas::harness::ScratchFolder folder;
   ServeOptions options = sample("direct");
