@@ -88,6 +88,7 @@ kernel::CallResult RecordingHost::call(const kernel::StageCall& call, kernel::Ar
     if (result.status == GRAVITAS_NEEDS_CAPACITY) return result;
     record.set_status(result.status);
     record.set_text(result.text);
+    record.set_may_be_refused(call.may_be_refused);
     if (result.status == GRAVITAS_OK) copy_columns(*arena, call.reply, call.info().reply, record.mutable_reply());
     keep(&record, call.target);
     return result;

@@ -88,7 +88,7 @@ void add_told(const v1::CapsuleDerivative& one, WrenchRange* told) {
 std::string failure_of(const v1::CapsuleCall& call, const MessageColumns& request, const Answer& answer,
                        const WrenchRange& told, bool with_physics) {
   if (!answer.fault.empty()) return answer.fault;
-  if (answer.status == GRAVITAS_REFUSED) return "it refused: " + answer.text;
+  if (answer.status == GRAVITAS_REFUSED) return call.may_be_refused() ? std::string() : "it refused: " + answer.text;
   // who knows no Jacobians is not asked for them
   if (answer.status == GRAVITAS_UNKNOWN_METHOD) return {};
   if (answer.status != GRAVITAS_OK) return "it failed: " + answer.text;
@@ -385,6 +385,7 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
           report.set_answered_now(report.answered_now() + 1);
         } else if (text.empty()) {
           report.set_same(report.same() + 1);
+          report.set_refused(report.refused() + (was.status == GRAVITAS_REFUSED ? 1 : 0));
         } else {
           report.set_different(report.different() + 1);
         }
@@ -427,6 +428,7 @@ report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string&
                     note_first(call, number, a.fault, &report);
                   } else {
                     report.set_same(report.same() + 1);
+                    report.set_refused(report.refused() + (a.status == GRAVITAS_REFUSED ? 1 : 0));
                   }
                   return text.empty();
                 });

@@ -92,6 +92,12 @@ std::string closeness(const report::v1::ReplayReport& report) {
   return report.tolerance() == 0.0 ? std::string() : fmt::format(" to within {:g}", report.tolerance());
 }
 
+// Of those that are the same.
+std::string refused_text(const report::v1::ReplayReport& report) {
+  if (report.refused() == 0) return {};
+  return fmt::format(" ({} refused, by which the run asked for less of the step)", report.refused());
+}
+
 // The first call that differs, and how far all answers are apart.
 void print_findings(const report::v1::ReplayReport& report) {
   if (!report.note().empty()) std::cerr << fmt::format("capsule '{}': {}\n", report.capsule(), report.note());
@@ -145,8 +151,8 @@ int replay(ReplayLine* line) {
   } else {
     for (const std::string& plugin : report.plugins()) std::cout << plugin << '\n';
     print_solutions(report);
-    std::cout << fmt::format("{}: {} same{}, {} different", counted(report.calls(), "call"), report.same(),
-                             closeness(report), report.different());
+    std::cout << fmt::format("{}: {} same{}{}, {} different", counted(report.calls(), "call"), report.same(),
+                             closeness(report), refused_text(report), report.different());
     if (report.failed_again() > 0) std::cout << fmt::format(", {} failed again", report.failed_again());
     if (report.answered_now() > 0)
       std::cout << fmt::format(", {} failed then and are answered now", report.answered_now());
@@ -172,7 +178,8 @@ int bisect(ReplayLine* line) {
   if (line->json) {
     std::cout << to_json(report, JsonForm::kPage);
   } else {
-    std::cout << fmt::format("{} answered alike{}", counted(report.same(), "call"), closeness(report));
+    std::cout << fmt::format("{} answered alike{}{}", counted(report.same(), "call"), closeness(report),
+                             refused_text(report));
     if (report.failed_again() > 0) std::cout << fmt::format(", {} failed alike", report.failed_again());
     std::cout << (report.different() == 0 ? "\n" : ", then a difference\n");
     print_findings(report);

@@ -92,17 +92,13 @@ void ServedRun::begin_environment(const Resumption* from) {
   past_swaps_.clear();
   events_ = std::make_unique<EventLog>("", description_);
   figures_ = std::make_unique<Figures>(description_);
-  recorder_ = std::make_unique<Recorder>(identity_of(first_description_), [this] {
-    recorder::v1::Tally tally;
-    figures_->write(&tally);
-    events_->write(&tally);
-    return tally;
-  });
+  recorder_ = std::make_unique<Recorder>(identity_of(first_description_), [this] { return tally(); });
   if (from != nullptr) {
     const recorder::v1::Checkpoint& kept = from->checkpoint;
     recorder_->set_edits({kept.edits().begin(), kept.edits().end()});
     recorder_->set_decisions({kept.decisions().begin(), kept.decisions().end()});
     for (const edit::v1::Edit& one : kept.edits()) note_edit(one, &past_);
+    *past_.mutable_swaps() = kept.tally().swaps();
     events_->resume(kept.tally());
     figures_->resume(kept.tally(), kept.edits_size() > 0);
     figures_->follow(environment_.get());

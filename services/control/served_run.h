@@ -37,6 +37,7 @@
 #include "services/recorder/recorder.h"
 #include "services/run/figures.h"
 #include "services/run/interruptible_host.h"
+#include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/session.h"
 #include "services/survey/instrumentation.h"
@@ -165,13 +166,15 @@ class ServedRun final : private kernel::CommitListener {
   // It begins, or has ended.
   void note_step(std::optional<Clock::time_point> begin);
   void make_step();
-  void keep_checkpoint(const JournalReading& known);
+  void keep_checkpoint(JournalReading known);
   void keep_faulted_state();
   void close_capture();
   Clock::time_point due() const;
   void require_steps_left(const std::string& what) const;
   std::uint32_t next_step(const std::string& what, std::uint32_t wanted) const;
   api::SwapOrdered order(kernel::SwapOrder order, OrderKind kind);
+  // As a journal has it, but for comparisons.
+  static recorder::v1::Decision order_message(const Order& order);
   // In the journal, but for comparisons: ordered, or called off.
   void note(const Order& order, bool is_called_off);
   const kernel::PluginChoice& choice_with(const std::string& what, Slot slot, const std::string& property,
@@ -192,6 +195,8 @@ class ServedRun final : private kernel::CommitListener {
   api::Status status_now();
   void write_plan(api::Plan* plan) const;
   std::vector<api::ServedSwap> swap_messages() const;
+  // What a checkpoint keeps of the report.
+  recorder::v1::Tally tally() const { return tally_of(*environment_, {}, past_, *figures_, *events_); }
   api::ServedSwap swap_message(const Order& order, const std::vector<kernel::SwapRecord>& records) const;
   // With those of before the last edit.
   std::vector<Order> pending_orders() const;
@@ -220,7 +225,7 @@ class ServedRun final : private kernel::CommitListener {
   const kernel::EnvironmentDescription first_description_;
   kernel::EnvironmentDescription description_;
   kernel::EnvironmentDescription active_;  // its slots alone: who answers, with which settings
-  // Faults and swaps of environments before the last edit; the edits.
+  // Faults and swaps of environments before the last edit, and swaps of the checkpoint; the edits.
   report::v1::Report past_;
   std::vector<api::ServedSwap> past_swaps_;
 

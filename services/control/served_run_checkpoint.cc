@@ -83,7 +83,7 @@ void ServedRun::order_again(const Resumption& from) {
     const std::uint32_t step = one.swap.step;
     if (step <= environment_->step_count() || step > environment_->total_steps()) continue;
     try {
-      order(std::move(one.swap), one.is_setting ? OrderKind::kSetting : OrderKind::kSwap);
+      order(std::move(one.swap), one.known.why() == kOrderOfSetting ? OrderKind::kSetting : OrderKind::kSwap);
     } catch (const BadInput& problem) {
       warnings.push_back(
           fmt::format("the swap that was ordered for step {} is not ordered again: {}", step, problem.what()));
@@ -93,12 +93,16 @@ void ServedRun::order_again(const Resumption& from) {
 }
 
 // Begins it; a reset begins it anew.
-void ServedRun::keep_checkpoint(const JournalReading& known) {
+void ServedRun::keep_checkpoint(JournalReading known) {
+  // that of another file begins with what is still to come
+  if (!goes_on_in_its_checkpoint(options_)) {
+    known = {};
+    for (const Order& one : pending_orders())
+      if (!one.compares()) known.orders.push_back(order_message(one));
+  }
   try {
     const std::string path = checkpoint_target(options_.checkpoint);
-    // the journal of another file starts anew
-    recorder_->keep(std::filesystem::absolute(path), options_.checkpoint_every,
-                    goes_on_in_its_checkpoint(options_) ? known : known.anew(), *environment_);
+    recorder_->keep(std::filesystem::absolute(path), options_.checkpoint_every, known, *environment_);
   } catch (const std::runtime_error& problem) {
     throw BadInput(problem.what());
   }
@@ -177,7 +181,7 @@ std::string ServedRun::command_to_resume() {
     const std::vector<kernel::PluginChoice>& own = description_.slot(slot).plugins;
     const auto same = std::ranges::find(own, plugin.declaration.name,
                                         [](const kernel::PluginChoice& choice) { return choice.declaration.name; });
-    if (same != own.end() && !have_same_settings(*same, plugin))
+    if (same != own.end() && !recorder_->keeps() && !have_same_settings(*same, plugin))
       add_warning(fmt::format("settings of {} for step {} are not part of the command that goes on: it has the scene's",
                               plugin.declaration.name, step));
   }

@@ -83,8 +83,10 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     std::erase_if(swaps, [&](const api::ServedSwap& one) {
       return std::ranges::find(pending, one.number(), &Order::number) != pending.end();
     });
+    *past_.mutable_swaps() = tally().swaps();
     for (const kernel::SwapRecord& swap : successor.settled) {
       renew_swap(swap, &swaps, static_cast<int>(swaps.size()));
+      renew_swap(swap, past_.mutable_swaps(), past_.swaps_size());
       tell(swap_event(*environment_, swap));
     }
     past_swaps_ = std::move(swaps);
@@ -97,17 +99,12 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     recorder_->set_decisions(std::move(decisions));
     scene_ = edited.scene();
     description_ = edited.description();
-    if (const std::unique_ptr<Survey> asked = std::move(survey_)) {
-      surveyor();
-      survey_->instrumentation.go_on_from(std::move(asked->instrumentation));
-    }
     pair_decisions_.follow(environment_->model(), next->model());
     environment_ = std::move(next);
     environment_->set_commit_listener(this);
     if (listener_ || pair_decisions_.has_decided()) environment_->set_pair_arbiter(&pair_decisions_);
     event_source_->begin_again(*environment_);
     reactions_->begin_again();
-    figures_->begin_again(environment_.get());
     with_subscriptions([&](Subscription* one) { one->source().begin_again(*environment_); });
     Event event{EventKind::kEdit, environment_->step_count(), environment_->time()};
     event.text = fmt::format("{} before step {}", counted(edit.changes_size(), "change"), edit.step());
@@ -119,13 +116,22 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
       made.add_warnings(warning);
       add_warning(warning);
     }
-    // last, as the edit is made: a disk may be full
+    // what may fail comes last, as the edit is made: a disk may be full, or who is asked for a potential fail
     try {
       recorder_->note_edit(edit);
-    } catch (const std::system_error& problem) {
+      figures_->begin_again(environment_.get());
+    } catch (const std::exception& problem) {
       fault_ = problem.what();
       keep_faulted_state();
       made.add_warnings(fault_);
+    }
+    if (const std::unique_ptr<Survey> asked = std::move(survey_)) {
+      try {
+        surveyor();
+        survey_->instrumentation.go_on_from(std::move(asked->instrumentation));
+      } catch (const std::exception&) {
+        survey_.reset();  // the next question says why
+      }
     }
     made.set_pause_us(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());
     return made;

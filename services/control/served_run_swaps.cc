@@ -180,11 +180,16 @@ api::SwapOrdered ServedRun::order(kernel::SwapOrder order, OrderKind kind) {
   return ordered;
 }
 
+recorder::v1::Decision ServedRun::order_message(const Order& order) {
+  return message_of(order.swap, order.kind == OrderKind::kSetting ? kOrderOfSetting : kOrderOfSwap);
+}
+
 void ServedRun::note(const Order& order, bool is_called_off) {
   if (order.compares()) return;
-  const char* why = is_called_off ? kCalledOff : order.kind == OrderKind::kSetting ? kOrderOfSetting : kOrderOfSwap;
+  recorder::v1::Decision message = order_message(order);
+  if (is_called_off) message.set_why(kCalledOff);
   try {
-    recorder_->note_order(message_of(order.swap, why));
+    recorder_->note_order(message);
   } catch (const std::system_error& problem) {
     // a disk may be full
     fault_ = problem.what();

@@ -12,34 +12,6 @@
 #include "services/run/file_names.h"
 
 namespace gravitas {
-namespace {
-
-// In the steps from an edit on, before the next, in which the scene is as described.
-void require_slots(const EditSchedule::Orders& orders, std::uint32_t edit, std::uint32_t next,
-                   kernel::EnvironmentDescription description) {
-  std::vector<kernel::LeftOut> left_out;
-  try {
-    left_out = kernel::make_plan(&description).left_out;
-  } catch (const std::invalid_argument& problem) {
-    throw BadInput(fmt::format("--edit before step {}: {}", edit, problem.what()));
-  }
-  const auto require = [&](Slot slot, const std::string& order) {
-    const auto found = std::ranges::find(left_out, slot_name(slot), &kernel::LeftOut::what);
-    if (found != left_out.end())
-      throw BadInput(
-          fmt::format("{}: after the edit before step {} the plan leaves the slot out: {}", order, edit, found->why));
-  };
-  for (const kernel::SwapOrder& one : orders.swaps)
-    if (one.step >= edit && one.step < next)
-      require(one.slot,
-              fmt::format("--swap {}={} at step {}", slot_name(one.slot), one.plugin.declaration.name, one.step));
-  for (const kernel::SwapOrder& one : orders.comparisons)
-    require(one.slot, fmt::format("--compare {}={}", slot_name(one.slot), one.plugin.declaration.name));
-  for (const kernel::FaultInjection& one : orders.faults)
-    if (one.step >= edit && one.step < next) require(one.slot, "--fault " + fault_text(one));
-}
-
-}  // namespace
 
 void EditSchedule::leave_out_past(std::uint32_t step, const std::vector<edit::v1::Edit>& journal) {
   // one may have been made before a step that was not
@@ -59,15 +31,42 @@ void EditSchedule::leave_out_past(std::uint32_t step, const std::vector<edit::v1
 }
 
 void EditSchedule::rehearse(const RunOptions& options, scene::v1::Scene scene,
-                            kernel::EnvironmentDescription description, Catalog* catalog, const Orders& orders) const {
+                            kernel::EnvironmentDescription description, Catalog* catalog) {
   for (std::size_t i = 0; i < to_come_.size(); ++i) {
     edit::v1::Edit edit = to_come_[i];
     const EditedScene edited(options, scene, description, catalog, &edit, nullptr);
     scene = edited.scene();
     description = edited.description();
     require_separate_files(options, scene, to_come_);
-    const std::uint32_t next = i + 1 < to_come_.size() ? to_come_[i + 1].step() : description.steps + 1;
-    require_slots(orders, edit.step(), next, description);
+    try {
+      kernel::EnvironmentDescription planned = description;
+      left_out_.push_back(kernel::make_plan(&planned).left_out);
+    } catch (const std::invalid_argument& problem) {
+      throw BadInput(fmt::format("--edit before step {}: {}", edit.step(), problem.what()));
+    }
+  }
+}
+
+void EditSchedule::require_slots(const Orders& orders) const {
+  for (std::size_t i = 0; i < left_out_.size(); ++i) {
+    const std::uint32_t edit = to_come_[i].step();
+    const auto is_between = [&](std::uint32_t step) {
+      return step >= edit && (i + 1 == to_come_.size() || step < to_come_[i + 1].step());
+    };
+    const auto require = [&](Slot slot, const std::string& order) {
+      const auto found = std::ranges::find(left_out_[i], slot_name(slot), &kernel::LeftOut::what);
+      if (found != left_out_[i].end())
+        throw BadInput(
+            fmt::format("{}: after the edit before step {} the plan leaves the slot out: {}", order, edit, found->why));
+    };
+    for (const kernel::SwapOrder& one : orders.swaps)
+      if (is_between(one.step))
+        require(one.slot,
+                fmt::format("swap {}={} at step {}", slot_name(one.slot), one.plugin.declaration.name, one.step));
+    for (const kernel::SwapOrder& one : orders.comparisons)
+      require(one.slot, fmt::format("--compare {}={}", slot_name(one.slot), one.plugin.declaration.name));
+    for (const kernel::FaultInjection& one : orders.faults)
+      if (is_between(one.step)) require(one.slot, "--fault " + fault_text(one));
   }
 }
 

@@ -141,12 +141,6 @@ bool is_same_edit(const edit::v1::Edit& a, const edit::v1::Edit& b) {
                                                     &edit::v1::Change::SerializeAsString);
 }
 
-JournalReading JournalReading::anew() const {
-  JournalReading reading;
-  reading.orders = orders;
-  return reading;
-}
-
 JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, std::uint32_t after) {
   JournalReading reading;
   JournalHeader header;

@@ -47,9 +47,6 @@ struct JournalReading {
   std::uint32_t last_step = 0;                    // of all commits
   std::string note;                               // what was left aside and why; empty: nothing
   bool is_damaged = false;                        // what was left aside is more than a torn end
-
-  // For a journal of another file, which knows the orders alone.
-  JournalReading anew() const;
 };
 
 // The same changes before the same step, wherever bodies were.

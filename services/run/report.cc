@@ -188,18 +188,21 @@ void write_swaps(const kernel::Environment& environment, std::span<const recorde
   std::ranges::stable_sort(*report->mutable_comparisons(), {}, &report::v1::SwapRecord::step);
 }
 
-void write_swaps(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
-                 const report::v1::Report& before, recorder::v1::Tally* tally) {
+recorder::v1::Tally tally_of(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
+                             const report::v1::Report& before, const Figures& figures, const EventLog& events) {
+  recorder::v1::Tally tally;
+  figures.write(&tally);
+  events.write(&tally);
   report::v1::Report all;
   *all.mutable_swaps() = before.swaps();
   write_swaps(environment, taken_over, &all);
-  tally->clear_swaps();
   for (report::v1::SwapRecord& swap : *all.mutable_swaps()) {
     // those of later steps are ordered again
     const bool is_refused = swap.outcome() == swap_state_name(kernel::SwapState::kRefused);
     if (swap.step() <= environment.step_count() + (is_refused ? 0 : 1) && !is_to_come(swap))
-      *tally->add_swaps() = std::move(swap);
+      *tally.add_swaps() = std::move(swap);
   }
+  return tally;
 }
 
 report::v1::Plan plan_message(const kernel::Environment& environment,

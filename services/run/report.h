@@ -10,6 +10,8 @@
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
 #include "plugin_sdk/slots.h"
+#include "services/recorder/event_log.h"
+#include "services/run/figures.h"
 #include "services/run/kernel_names.h"
 
 namespace gravitas {
@@ -26,9 +28,9 @@ void write_faults(const kernel::Environment& environment, report::v1::Report* re
 // what was `taken_over`, in the step that a decision tells (resumption.h).
 void write_swaps(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
                  report::v1::Report* report);
-// With those of before: what a checkpoint keeps of them.
-void write_swaps(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
-                 const report::v1::Report& before, recorder::v1::Tally* tally);
+// What a checkpoint keeps of the report. `before`: with the swaps of environments before this one.
+recorder::v1::Tally tally_of(const kernel::Environment& environment, std::span<const recorder::v1::Decision> taken_over,
+                             const report::v1::Report& before, const Figures& figures, const EventLog& events);
 void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to);
 void note_edit(const edit::v1::Edit& edit, report::v1::Report* report);
 

@@ -17,6 +17,7 @@
 #include "services/recorder/identity.h"
 #include "services/recorder/library_digest.h"
 #include "services/recorder/recorder.h"
+#include "services/run/exchange_spec.h"
 #include "services/run/kernel_names.h"
 #include "services/run/session.h"
 
@@ -124,7 +125,7 @@ std::vector<LiveOrder> orders_to_come(const Resumption& resumed, const Catalog& 
   for (const recorder::v1::Decision& one : resumed.journal.orders) {
     if (one.step() <= std::max(resumed.journal.last_step, resumed.checkpoint.step())) continue;
     try {
-      LiveOrder order{ordered_swap(one, catalog), one.why() == kOrderOfSetting};
+      LiveOrder order{ordered_swap(one, catalog), one};
       if (!has_made(resumed.checkpoint, order.swap)) orders.push_back(std::move(order));
     } catch (const std::runtime_error& problem) {
       warnings->push_back(
@@ -143,6 +144,47 @@ Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel:
   answering.begun = answering.now;
   take_back_swaps(decisions, catalog, description, &answering.begun);
   return answering;
+}
+
+std::vector<kernel::SwapOrder> swaps_to_come(const Resumption& resumed, std::vector<kernel::SwapOrder> named,
+                                             std::span<const LiveOrder> live, const Catalog& catalog,
+                                             std::vector<recorder::v1::Decision>* taken_over,
+                                             std::vector<std::string>* warnings) {
+  // one of a step that was not made is in the checkpoint already
+  const auto is_restored = [&](const kernel::SwapOrder& one) { return has_made(resumed.checkpoint, one); };
+  std::erase_if(
+      named, [&](const kernel::SwapOrder& one) { return one.step <= resumed.checkpoint.step() || is_restored(one); });
+  std::vector<kernel::SwapOrder> known;
+  // false if it is ordered already, or by the command line, too
+  const auto order_again = [&](kernel::SwapOrder order) {
+    const auto is_it = [&](const kernel::SwapOrder& one) {
+      return one.slot == order.slot && one.step == order.step &&
+             one.plugin.declaration.name == order.plugin.declaration.name;
+    };
+    const auto is_same = [&](const kernel::SwapOrder& one) {
+      return is_it(one) && have_same_settings(one.plugin, order.plugin);
+    };
+    if (std::ranges::any_of(known, is_same) || is_restored(order)) return false;
+    const auto same = std::ranges::find_if(named, is_it);
+    const bool is_named = same != named.end();
+    if (is_named) {
+      if (has_same_properties(same->plugin.declaration, order.plugin.declaration))
+        same->plugin.settings = std::move(order.plugin.settings);
+      order = std::move(*same);
+      named.erase(same);
+    }
+    known.push_back(std::move(order));
+    return !is_named;
+  };
+  for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
+    if (!order_again(order_of(decision, catalog)) || decision.why() == "swap") continue;
+    taken_over->push_back(decision);
+    warnings->push_back(fmt::format("from step {} on slot {} is answered by {}, as the journal has it ({})",
+                                    decision.step(), decision.slot(), decision.plugin(), decision.why()));
+  }
+  for (const LiveOrder& one : live) order_again(one.swap);
+  known.insert(known.begin(), named.begin(), named.end());
+  return known;
 }
 
 void warn_of_unknown_swaps(std::span<const kernel::SwapOrder> orders, const recorder::v1::Checkpoint& checkpoint,
@@ -164,13 +206,6 @@ void warn_of_unknown_swaps(std::span<const kernel::SwapOrder> orders, const reco
                     "not ordered",
                     slot_name(order.slot), plugin, order.step, checkpoint.step()));
   }
-}
-
-void note_takeover(const recorder::v1::Decision& decision, std::vector<recorder::v1::Decision>* taken_over,
-                   std::vector<std::string>* warnings) {
-  taken_over->push_back(decision);
-  warnings->push_back(fmt::format("from step {} on slot {} is answered by {}, as the journal has it ({})",
-                                  decision.step(), decision.slot(), decision.plugin(), decision.why()));
 }
 
 kernel::Decision as_first_decided(kernel::Decision decision, std::span<const recorder::v1::Decision> taken_over) {

@@ -31,7 +31,7 @@ bool has_made(const recorder::v1::Checkpoint& checkpoint, const kernel::SwapOrde
 // A swap that was ordered while the run was served, and is still to come.
 struct LiveOrder {
   kernel::SwapOrder swap;
-  bool is_setting;  // that was changed
+  recorder::v1::Decision known;  // as the journal has it
 };
 // Those that the journal knows for steps that it does not know. One whose plugin is not to be had is warned of.
 std::vector<LiveOrder> orders_to_come(const Resumption& resumed, const Catalog& catalog,
@@ -45,13 +45,18 @@ struct Answering {
 Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel::EnvironmentDescription& description,
                        const Catalog& catalog);
 
+// Swaps of steps to come: those that the command line names, and those that the journal knows, once each. A swap that both know
+// has the settings that the journal knows. Who took over in a step that the journal knows takes over there by an order, which
+// is told as no swap. Throws std::runtime_error where a plugin is not to be had.
+std::vector<kernel::SwapOrder> swaps_to_come(const Resumption& resumed, std::vector<kernel::SwapOrder> named,
+                                             std::span<const LiveOrder> live, const Catalog& catalog,
+                                             std::vector<recorder::v1::Decision>* taken_over,
+                                             std::vector<std::string>* warnings);
+
 // Says of swaps that were ordered for steps up to the checkpoint's that it knows of none there.
 void warn_of_unknown_swaps(std::span<const kernel::SwapOrder> orders, const recorder::v1::Checkpoint& checkpoint,
                            std::vector<std::string>* warnings);
 
-// Who took over in a step that the journal knows takes over there by an order, which is told as no swap.
-void note_takeover(const recorder::v1::Decision& decision, std::vector<recorder::v1::Decision>* taken_over,
-                   std::vector<std::string>* warnings);
 // With the reason of the first time.
 kernel::Decision as_first_decided(kernel::Decision decision, std::span<const recorder::v1::Decision> taken_over);
 

@@ -78,10 +78,11 @@ class Run final : private kernel::CommitListener {
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
     read_edits(resumed ? &*resumed : nullptr);
     read_orders();
-    edits_.rehearse(options_, scene_, description_, &catalog_, {swaps_, comparisons_, faults_});
+    edits_.rehearse(options_, scene_, description_, &catalog_);
     read_kinds();
     Answering answering{description_, description_};
     if (resumed) apply_decisions(*resumed, &answering);
+    edits_.require_slots({swaps_, comparisons_, faults_});
     require_workers(answering.now);
     environment_ = start(answering.begun, starter(), &scene_);
     if (!options_.instrumentation.empty() || !options_.joints.empty()) survey_.emplace(answering.now, options_.starter);
@@ -92,7 +93,7 @@ class Run final : private kernel::CommitListener {
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed, answering.now);
     for (const RerunSpec& rerun : reruns_) require_rerun(rerun, *environment_);
-    give_orders();
+    give_orders(description_, &*environment_);
     warn_of_orders_beyond_the_end();
   }
 
@@ -268,28 +269,13 @@ class Run final : private kernel::CommitListener {
   // Whoever answered when the checkpoint was made answers again; what the journal knows of later steps is ordered for
   // them. Swaps of the command line up to the checkpoint are done, or were refused.
   void apply_decisions(const Resumption& resumed, Answering* answering) {
-    const std::uint32_t step = resumed.checkpoint.step();
     warn_of_unknown_swaps(swaps_, resumed.checkpoint, &warnings_);
-    // one of a step that was not made is in the checkpoint already
-    const auto is_restored = [&](const kernel::SwapOrder& one) { return has_made(resumed.checkpoint, one); };
-    std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step || is_restored(one); });
     from_checkpoint(options_.resume, [&] {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
       *answering = answering_at(resumed.checkpoint, description_, catalog_);
-      const auto order_again = [&](kernel::SwapOrder order) {
-        const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
-          return one.slot == order.slot && one.step == order.step &&
-                 one.plugin.declaration.name == order.plugin.declaration.name &&
-                 have_same_settings(one.plugin, order.plugin);
-        });
-        if (is_ordered || is_restored(order)) return false;
-        swaps_.push_back(std::move(order));
-        return true;
-      };
-      for (const auto& decision : resumed.journal.decisions)
-        if (order_again(order_of(decision, catalog_)) && decision.why() != "swap")
-          note_takeover(decision, &taken_over_, &warnings_);
-      for (LiveOrder& one : orders_to_come(resumed, catalog_, &warnings_)) order_again(std::move(one.swap));
+      const std::vector<LiveOrder> live = orders_to_come(resumed, catalog_, &warnings_);
+      for (const LiveOrder& one : live) live_orders_.push_back(one.known);
+      swaps_ = swaps_to_come(resumed, std::move(swaps_), live, catalog_, &taken_over_, &warnings_);
     });
     // how far hosting may differ is for the command line to say
     for (auto* one : {&answering->now, &answering->begun}) apply_hosting(options_.hosting, one);
@@ -338,6 +324,7 @@ class Run final : private kernel::CommitListener {
     EditedScene::Successor next = edited.succeed(*environment_, begun, catalog_, starter(), &decisions);
     edited.look_at_limits(active, *environment_, begun, *next.environment);
     const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next.environment);
+    give_orders(edited.description(), &*next.environment);
     for (const std::string& warning : edited.warnings())
       if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
     for (const auto& [a, b] : next.parted)
@@ -353,20 +340,19 @@ class Run final : private kernel::CommitListener {
     environment_ = std::move(next.environment);
     edits_.note(*edit);
     note_edit(*edit, &result_.report);
+    attend();
     if (recorder_) recorder_->set_decisions(decisions_);
+    // before all that may fail in the new environment
+    if (recorder_) recorder_->note_edit(*edit);
     if (event_source_) event_source_->begin_again(*environment_);
     if (trajectory_) trajectory_->follow(description_);
     if (reactions_) reactions_->begin_again();
     if (survey_) survey_->begin_again(begun);
-    attend();
     figures_->begin_again(environment_.get());
-    give_orders();
     tell({EventKind::kEdit, environment_->step_count(), environment_->time()},
          fmt::format("{} before step {}", counted(edit->changes_size(), "change"), edit->step()));
     for (const std::uint32_t body : woken)
       tell({EventKind::kWake, environment_->step_count(), environment_->time(), body}, "");
-    // last, as the edit is made: a disk may be full
-    if (recorder_) recorder_->note_edit(*edit);
   }
 
   void attend() {
@@ -391,22 +377,22 @@ class Run final : private kernel::CommitListener {
   }
 
   // Those of steps up to the next edit; after it another environment gets the rest.
-  void give_orders() {
-    const std::uint32_t made = environment_->step_count();
+  void give_orders(const kernel::EnvironmentDescription& description, kernel::Environment* world) {
+    const std::uint32_t made = world->step_count();
     const auto is_due = [&](std::uint32_t step) {
       return (made == 0 || step > made) && (edits_.to_come().empty() || step < edits_.to_come().front().step());
     };
     try {
       for (const kernel::SwapOrder& order : swaps_)
-        if (is_due(order.step)) environment_->order_swap(order);
+        if (is_due(order.step)) world->order_swap(order);
       // after an edit they are counted anew
       for (kernel::SwapOrder& order : comparisons_) {
         if (made > 0) order.step = made + 1;
-        environment_->order_swap(order, true);
+        world->order_swap(order, true);
       }
       for (const kernel::FaultInjection& fault : faults_)
-        if (is_due(fault.step)) order_fault(fault, description_, swaps_, &*environment_);
-      for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);
+        if (is_due(fault.step)) order_fault(fault, description, swaps_, world);
+      for (const RerunSpec& rerun : reruns_) world->set_rerun_every(rerun.slot, rerun.every);
     } catch (const std::invalid_argument& problem) {
       throw BadInput(problem.what());
     }
@@ -481,11 +467,7 @@ class Run final : private kernel::CommitListener {
 
   // What the report counts, for a checkpoint.
   recorder::v1::Tally tally() const {
-    recorder::v1::Tally tally = resumed_tally_;
-    figures_->write(&tally);
-    write_swaps(*environment_, taken_over_, result_.report, &tally);
-    if (events_) events_->write(&tally);
-    return tally;
+    return tally_of(*environment_, taken_over_, result_.report, *figures_, *events_);
   }
 
   // Listens if there is something to keep or to compare.
@@ -497,10 +479,10 @@ class Run final : private kernel::CommitListener {
     recorder_->set_decisions(decisions_);
     if (options_.listener) recorder_->note_listener();
     if (checkpoint_path_.empty()) return;
+    // that of another file begins with what is still to come
+    if (!goes_on_in_its_checkpoint(options_)) journal_ = {.orders = live_orders_};
     try {
-      // the journal of another file starts anew
-      recorder_->keep(checkpoint_path_, options_.checkpoint_every,
-                      goes_on_in_its_checkpoint(options_) ? journal_ : journal_.anew(), *environment_);
+      recorder_->keep(checkpoint_path_, options_.checkpoint_every, journal_, *environment_);
     } catch (const std::system_error& error) {
       if (is_disk_error(error.code())) throw;
       throw BadInput(error.what());
@@ -528,6 +510,7 @@ class Run final : private kernel::CommitListener {
   std::vector<kernel::FaultInjection> faults_;
   std::vector<RerunSpec> reruns_;
   std::vector<recorder::v1::Decision> decisions_, taken_over_;  // in force; in the journal, and no swaps
+  std::vector<recorder::v1::Decision> live_orders_;             // of the journal, still to come
   std::optional<PairDecisions> pair_decisions_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;

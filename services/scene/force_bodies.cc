@@ -1,5 +1,7 @@
 #include "services/scene/force_bodies.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -28,13 +30,20 @@ const TypeDeclaration* type_of(const kernel::ForceDescription& force, const Buil
   return find_type(context.description.force.plugins[force.plugin].declaration, force.type);
 }
 
-// Applies a force to the body that it names, too.
+// Applies a force to the body that it names, too. One that names it back would be at both of its ends, where the force does
+// nothing, whether the body moves or not.
 void add_reaction(std::uint32_t force, std::uint32_t row, BuildContext* context) {
   kernel::BodyDescription& body = context->description.bodies[row];
-  if (std::ranges::find(body.forces, force) != body.forces.end()) {
-    const v1::Force& written = context->scene.forces().force(static_cast<int>(force));
-    context->diagnostics->error(place_of(written.location()), "Force \"" + written.id() + "\" acts between \"" +
-                                                                  body.id + "\" and itself; allowed: another body");
+  const v1::Force& written = context->scene.forces().force(static_cast<int>(force));
+  // what does not move has dropped its own
+  const auto& own = context->environment.space().bodies().body(static_cast<int>(row)).forces();
+  if (std::ranges::find(body.forces, force) != body.forces.end() || std::ranges::find(own, written.id()) != own.end()) {
+    context->diagnostics->error(
+        place_of(written.location()),
+        fmt::format(
+            "Force \"{0}\" acts between \"{1}\" and itself; allowed: another body, or \"{1}\" without it in its "
+            "Forces, which feels the reaction all the same",
+            written.id(), body.id));
     return;
   }
   if ((body.flags & kMovable) != 0) body.forces.push_back(force);

@@ -398,6 +398,44 @@ TEST(Capsule, RefusedAnswersOfACaptureFailAgain) {
   EXPECT_THAT(judged.out, HasSubstr("its answer breaks a law: kinetic energy grows"));
 }
 
+// Links by narrow cones that whip: the trial of a whole step runs away, the integrator refuses it, and half of the step is made.
+TEST(Capsule, ARefusalThatWasAnAnswerIsTheSame) {
+  const ScratchFolder folder;
+  std::string bodies, joints;
+  for (int i = 0; i < 3; ++i) {
+    const double middle = 0.1 + 0.2 * i;
+    bodies += fmt::format(
+        "Body {{ Id = \"L{}\" Mass = 0.2 PrincipalMoments = {{7e-4, 7e-4, 7e-4}} Forces = {{ \"Down\" }} "
+        "KineticProperties "
+        "{{ Position = {{{}, 0, 0}} LinearVelocity = {{0, 0, {}}} AngularVelocity = {{0, 10, 0}} }} }}\n",
+        i, middle, -10.0 * middle);
+    joints += fmt::format(
+        "Constraint {{ Type = \"Spherical\" Id = \"J{0}\" Body1 = \"{1}\" Body2 = \"L{0}\" CustomProperties {{ "
+        "BindPoint = {{{2}, 0, 0}} Axis = {{1, 0, 0}} ReachConeAngle = 0.05 }} }}\n",
+        i, i == 0 ? std::string() : fmt::format("L{}", i - 1), 0.2 * i);
+  }
+  const std::string scene = folder.write(
+      "whip.gravitas",
+      "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+      "Simulator { Type = \"Smooth\" CustomProperties { TimeStep = 0.03333333333333333 Duration = 0.1 } }\n"
+      "Environment { Space { Bodies {\n" +
+          bodies + "} }\nConstraints {\n" + joints + "} }\n");
+  const std::string file = folder.path("whip.capsule"), dormand = "DormandPrince54";
+  const ProgramResult captured =
+      run_program({"capture", scene, "--set", "Solver=Newton", "--set", "Integrator=" + dormand, "--slot", "integrator",
+                   "--out", file, "--steps", "1"},
+                  folder);
+  ASSERT_EQ(captured.exit_code, 0) << captured.err;
+  EXPECT_THAT(captured.err, HasSubstr("the integrator refused trials of whole steps"));
+  constexpr const char* kRefused = " (1 refused, by which the run asked for less of the step)";
+  const ProgramResult again = run_program({"replay", file}, folder);
+  EXPECT_EQ(again.exit_code, 0) << again.out;
+  EXPECT_THAT(again.out, HasSubstr(std::string(" same") + kRefused + ", 0 different\n"));
+  const ProgramResult alike = run_program({"bisect", file, dormand, dormand}, folder);
+  EXPECT_EQ(alike.exit_code, 0) << alike.out;
+  EXPECT_THAT(alike.out, HasSubstr(std::string(" answered alike") + kRefused + "\n"));
+}
+
 TEST(Capsule, BytesOfAnyKindAreReadWithoutHarm) {
   const ScratchFolder folder;
   const std::string file = capture("solver", folder);

@@ -127,6 +127,94 @@ TEST(ServedOrders, TheCommandThatGoesOnHasThem) {
   EXPECT_THAT(served.client.status().last_warning(), Not(HasSubstr("what was set")));
 }
 
+// As by the server, which would have refused it, too.
+TEST(ServedOrders, AnEditThatLeavesOutTheirSlotIsRefusedBeforeTheRunGoesOn) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  {
+    Served served(options);
+    served.client.swap(parse_swap_request("constraint=AngularMotor@step=60"));
+    served.client.step(10);
+  }
+  options.run.resume = options.run.checkpoint;
+  options.run.checkpoint.clear();
+  options.run.edits = {"remove Constraint.MyAngularMotor@step=60"};
+  std::string problem;
+  try {
+    harness::run_quietly(options.run);
+  } catch (const BadInput& refused) {
+    problem = refused.what();
+  }
+  EXPECT_THAT(problem, HasSubstr("swap constraint=AngularMotor at step 60: after the edit before step 60 the plan "
+                                 "leaves the slot out: "));
+  // before that edit it is there
+  options.run.edits = {"remove Constraint.MyAngularMotor@step=61"};
+  EXPECT_EQ(harness::run_quietly(options.run).report.swaps_size(), 1);
+}
+
+// The command that goes on has the scene's settings, the journal those that were set.
+TEST(ServedOrders, ASwapOfTheCommandAndTheJournalIsMadeOnce) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  const auto begin = [](Served* one) {
+    one->client.set_property(parse_set_request("Solver.Iterations=3"));
+    one->client.step(10);
+    one->client.swap(parse_swap_request("solver=Sequential@step=60"));
+    one->run.save_checkpoint();
+  };
+  Served quiet(sample("direct"));
+  begin(&quiet);
+  const std::string chain = quiet.to_the_end().chain_hash();
+  {
+    Served served(options);
+    begin(&served);
+  }
+  RunOptions again = sample("direct").run;
+  again.resume = options.run.checkpoint;
+  again.swaps = {"solver=Sequential@step=60"};
+  const RunResult result = harness::run_quietly(again);
+  EXPECT_EQ(result.report.chain_hash(), chain);
+  std::vector<std::uint32_t> steps;
+  for (const report::v1::SwapRecord& swap : result.report.swaps()) steps.push_back(swap.step());
+  EXPECT_THAT(steps, ::testing::ElementsAre(1, 60));
+}
+
+// One whose plugin is not to be had is told once, and is none of a journal that is begun then.
+TEST(ServedOrders, AJournalThatIsBegunAnewHasThoseThatStand) {
+  const gravitas::harness::ScratchFolder folder;
+  const std::string copy = folder.path("copy.so");
+  std::filesystem::copy(in_build("/lib/gravitas/solver_newton.so"), copy);
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  {
+    Served served(options);
+    served.client.swap(parse_swap_request("solver=" + copy + "@step=50"));
+    served.client.swap(parse_swap_request("integrator=RK4@step=60"));
+  }
+  ServeOptions again = sample("direct");
+  again.run.resume = options.run.checkpoint;
+  again.run.checkpoint = folder.path("by_serve.ck");
+  { const Served resumed(again); }
+  again.run.checkpoint = folder.path("by_run.ck");
+  EXPECT_THAT(harness::run_quietly([&] {
+                RunOptions some = again.run;
+                some.steps = 10;
+                return some;
+              }())
+                  .report.warnings(),
+              ::testing::Contains(HasSubstr("is not ordered again")));
+  for (const char* kept : {"by_serve.ck", "by_run.ck"}) {
+    RunOptions rest = sample("direct").run;
+    rest.resume = folder.path(kept);
+    const RunResult result = harness::run_quietly(rest);
+    EXPECT_THAT(result.report.warnings(), Not(::testing::Contains(HasSubstr("is not ordered again")))) << kept;
+    ASSERT_EQ(result.report.swaps_size(), 1) << kept;
+    EXPECT_EQ(result.report.swaps(0).step(), 60U) << kept;
+  }
+}
+
 TEST(ServedOrders, ACaptureWritesOverNoCheckpoint) {
   const gravitas::harness::ScratchFolder folder;
   ServeOptions options = sample("direct");

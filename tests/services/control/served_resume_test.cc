@@ -252,6 +252,42 @@ TEST(ServedResume, ListsTheSwapsThatWereMade) {
   }
 }
 
+// Two of one slot, the first of them before an edit, and the second called off once: as in a run that never stopped.
+TEST(ServedResume, KeepsTheSwapsOfTheReport) {
+  const gravitas::harness::ScratchFolder folder;
+  const std::string move = "set Body.Ball01.LinearVelocity={0,1,0}";
+  RunOptions whole = sample("direct").run;
+  whole.swaps = {"solver=Newton@step=18", "solver=Direct@step=40"};
+  whole.edits = {move + "@step=20"};
+  const report::v1::Report expected = harness::run_quietly(whole).report;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  for (const std::uint32_t more : {2U, 30U}) {
+    {
+      Served served(options);
+      served.client.swap(harness::parse_swap_request("solver=Newton@step=18"));
+      api::CallOffRequest off;
+      off.set_number(served.client.swap(harness::parse_swap_request("solver=Direct@step=45")).number());
+      served.client.swap(harness::parse_swap_request("solver=Direct@step=40"));
+      served.client.step(19);
+      served.run.call_off(off);
+      served.edit({move});
+      served.client.step(more);
+      served.run.save_checkpoint();
+    }
+    RunOptions rest = sample("direct").run;
+    rest.resume = options.run.checkpoint;
+    const report::v1::Report resumed = harness::run_quietly(rest).report;
+    EXPECT_EQ(resumed.chain_hash(), expected.chain_hash());
+    ASSERT_EQ(resumed.swaps_size(), 2) << more;
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_EQ(resumed.swaps(i).step(), expected.swaps(i).step());
+      EXPECT_EQ(resumed.swaps(i).from(), expected.swaps(i).from());
+      EXPECT_EQ(resumed.swaps(i).outcome(), "committed");
+    }
+  }
+}
+
 TEST(ServedResume, AJournalThatIsReplacedMeanwhileIsTold) {
   const gravitas::harness::ScratchFolder folder;
   ServeOptions options = sample("direct");

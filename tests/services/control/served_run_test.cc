@@ -3,9 +3,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <future>
@@ -496,6 +499,16 @@ TEST(ServerSocket, IsPrivateAndRemovesWhatItMade) {
     EXPECT_THROW(ServerSocket second(path), BadInput);
   }
   EXPECT_NE(access(path.substr(0, path.rfind('/')).c_str(), F_OK), 0);
+  // one that was killed leaves its socket, where nobody answers
+  const gravitas::harness::ScratchFolder left;
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::snprintf(address.sun_path, sizeof address.sun_path, "%s", left.path("control.sock").c_str());
+  const int dead = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  ASSERT_EQ(bind(dead, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  close(dead);
+  EXPECT_EQ(access(address.sun_path, F_OK), 0);
+  EXPECT_NO_THROW(ServerSocket(left.path("control.sock")));
   const gravitas::harness::ScratchFolder folder;
   EXPECT_THROW(ServerSocket(folder.write("file", "kept")), BadInput);
   EXPECT_EQ(gravitas::harness::read_file(folder.path("file")), "kept");

@@ -491,9 +491,9 @@ TEST(EditedRun, WhatIsOrderedOfASlotThatAnEditLeavesOutIsRefusedBeforeTheRunBegi
   const std::string gone =
       ": after the edit before step 20 the plan leaves the slot out: there are neither contacts nor joints";
   run.options.swaps = {"solver=Newton@step=30"};
-  EXPECT_EQ(run.refusal(), "--swap solver=Newton at step 30" + gone);
+  EXPECT_EQ(run.refusal(), "swap solver=Newton at step 30" + gone);
   run.options.swaps = {"solver=Newton@step=20"};
-  EXPECT_EQ(run.refusal(), "--swap solver=Newton at step 20" + gone);
+  EXPECT_EQ(run.refusal(), "swap solver=Newton at step 20" + gone);
   run.options.swaps.clear();
   run.options.comparisons = {"solver=Newton"};
   EXPECT_EQ(run.refusal(), "--compare solver=Newton" + gone);

@@ -118,13 +118,35 @@ TEST(EditedSwap, OfAnEmptiedSlotSaysThatItsProbationEnds) {
             "the edit before step 53 ended its probation: its slot has other plugins in the edited scene, or none");
 }
 
-// GjkOnly knows no meshes, and nobody goes back to it where there are some.
-TEST(EditedSwap, IsNotTakenBackToWhoDoesNotServeTheEditedScene) {
-  const ScratchFolder folder;
+// A scene that adds a mesh, which GjkOnly does not know.
+std::string write_mesh(const ScratchFolder& folder) {
   folder.write("tetrahedron.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
-  const std::string mesh = folder.write("mesh.gravitas", R"(
+  return folder.write("mesh.gravitas", R"(
     Geometries { Geometry { Type = "TriangleMesh" Id = "Rock" CustomProperties { File = "tetrahedron.obj" } } }
     Bodies { Body { Id = "Rock" GeometryId = "Rock" KineticProperties { Position = {9, 0, 0} } } })");
+}
+
+// Whoever goes on from what it kept has the scene of before.
+TEST(EditedSwap, ThatIsToComeAndCannotBeInTheEditedSceneLeavesTheRunAsItWas) {
+  const ScratchFolder folder;
+  RunOptions options = swapped("collision=GjkOnly@step=60", {"add " + write_mesh(folder) + "@step=53"});
+  options.checkpoint = folder.path("checkpoint");
+  const RunResult stopped = run_quietly(options);
+  EXPECT_EQ(stopped.outcome, RunOutcome::kFailed);
+  EXPECT_TRUE(stopped.is_bad_input);
+  EXPECT_THAT(stopped.fault, HasSubstr("does not serve the type 'TriangleMesh'"));
+  EXPECT_EQ(stopped.report.edits_size(), 0);
+  EXPECT_EQ(stopped.checkpoint_step, 52U);
+  RunOptions rest = swapped("collision=GjkOnly@step=60", {});
+  const std::string chain = run_quietly(rest).report.chain_hash();
+  rest.resume = options.checkpoint;
+  EXPECT_EQ(run_quietly(rest).report.chain_hash(), chain);
+}
+
+// Nobody goes back to who does not know what it has.
+TEST(EditedSwap, IsNotTakenBackToWhoDoesNotServeTheEditedScene) {
+  const ScratchFolder folder;
+  const std::string mesh = write_mesh(folder);
   RunOptions options = swapped("collision=GjkOnly@step=10", {"add " + mesh + "@step=53"});
   options.swaps.push_back("collision=Standard@step=50");
   const RunResult result = run_quietly(options);

@@ -74,6 +74,22 @@ TEST(ForceBodies, AreRefusedWhereThereAreNone) {
       ElementsAre(HasSubstr("acts between \"A\" and itself")));
 }
 
+// Whatever bears it.
+TEST(ForceBodies, DoNotNameTheForceThatNamesThem) {
+  for (const char* kind : {"Mass = 1 PrincipalMoments = {1, 1, 1}", "Kinematic = true", "Immovable = true"}) {
+    const std::string scene = std::string(R"(
+Forces { Force { Type = "Link" Id = "L" CustomProperties { AnchorBody = "B" } } }
+Environment { Space { Type = "Grid" Bodies {
+  Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} Forces = {"L"} }
+  Body { Id = "B" Forces = {"L"} )") +
+                              kind + "} } } KineticIntegrator = \"Euler\" }";
+    EXPECT_THAT(build(scene, {}, force_catalog()).errors(),
+                ElementsAre(HasSubstr("Force \"L\" acts between \"B\" and itself; allowed: another body, or \"B\" "
+                                      "without it in its Forces")))
+        << kind;
+  }
+}
+
 TEST(ForceBodies, AreNoBelts) {
   const std::string scene = R"(
 Geometries { Geometry { Type = "Sphere" Id = "Round" CustomProperties { Radius = 1 } } }
