@@ -50,7 +50,7 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
   // what detectors and solvers do not tell from touching
   const double near = std::max(encounter.slop, target_gap);
   const double pressed =
-      encounter.is_touching ? pressed_time(encounter, acceleration, length, shortest_flight) : length;
+      encounter.fraction <= 0.0 ? pressed_time(encounter, acceleration, length, shortest_flight) : length;
   const bool comes_back = encounter.start_speed > 0.0 && encounter.end_speed < 0.0;
   const double top = comes_back ? encounter.start_speed / -acceleration : 0.0;
   if (encounter.fraction <= 0.0 && (!comes_back || 2.0 * top > shortest_flight))

@@ -22,7 +22,7 @@ struct Encounter {
   // Of a pair that starts closed: how fast it bounced off, how fast turning may bring other parts of it together, and how
   // deep these may come unseen, m. Without such parts 0.
   double bounce_speed = 0.0, turning_speed = 0.0, harmless_depth = 0.0;
-  // How deep the trial may press a touching pair together, m: beyond, what is thin may be pushed out on its other side.
+  // How deep the trial may press a pair that starts closed together, m: beyond, what is thin may be pushed out on its other side.
   double most_pressed = std::numeric_limits<double>::infinity();
 };
 
@@ -38,7 +38,7 @@ struct NextStop {
 // is apart has a time of impact. Another that starts closed and parts, to come back within the trial, is followed to the top
 // of its flight; so is one that the straight motion lets meet before, if a trial of that length meets no more (what turns
 // may come back sooner). Flights shorter than `shortest_flight`, or lower than the target gap or what the solver left open,
-// are none: the pair rests. What touches and is pressed together ends its trial at `most_pressed`, but for trials shorter than a
+// are none: the pair rests. What starts closed and is pressed together ends its trial at `most_pressed`, but for trials shorter than a
 // thousand of the shortest flights. One that starts so near that the collision slot calls it met, but no nearer than target_gap,
 // flies on until it is. One that comes from afar is met where the trial, taken for the straight motion between its ends,
 // deviates from it by less than half the target (by |a| t (length - t) / 2 at the time t). Until then trials are shortened

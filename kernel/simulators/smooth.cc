@@ -26,7 +26,10 @@ void Environment::ask_reactions() {
                       data_.derivative_linear_velocity, data_.derivative_angular_velocity);
   };
   ask_joints();
-  if (may_let_go(data_.discrepancies.columns()) && !ask_start_joints()) ask_joints();
+  if (!may_let_go(data_.discrepancies.columns()))
+    data_.start_joints.resize(0);
+  else if (!ask_start_joints())
+    ask_joints();
   for (const auto& [body, curve] : model_.curves) {
     const Twist change = curve.at(data_.derivative_time[0]).change;
     set_vector(data_.kinematic_acceleration.span(), 2 * body, change.linear);

@@ -11,14 +11,15 @@ namespace gravitas::kernel {
 // to be asked anew then: a rope that ends on the axis of its drum is none.
 bool Environment::ask_start_joints() {
   DiscrepancyAnswer &trial = data_.discrepancies, &start = data_.start_joints;
-  if (start.mode.size() > 0) return true;
+  const auto are_the_same = [&] { return std::ranges::equal(start.constraint.span(), trial.constraint.span()); };
+  if (start.mode.size() > 0 && are_the_same()) return true;
   std::swap(trial, start);
   ask_discrepancies(data_.time, front().position, front().orientation, start_linear_velocity(),
                     start_angular_velocity());
   std::swap(trial, start);
-  const bool are_the_same = std::ranges::equal(start.constraint.span(), trial.constraint.span());
-  if (!are_the_same) start.resize(0);
-  return are_the_same;
+  if (are_the_same()) return true;
+  start.resize(0);
+  return false;
 }
 
 // What bodies do at the start, or an impulse gives them, joints may not allow: it jumps there and then, as by a solve at the

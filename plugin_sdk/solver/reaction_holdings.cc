@@ -25,6 +25,13 @@ double upper_limit(const Discrepancy& d, int axis) {
 
 }  // namespace
 
+bool may_hold(const Discrepancy& d, int axis) {
+  const AxisMode mode = axis_mode(d.modes, axis);
+  if (mode == AxisMode::kFree || mode == AxisMode::kLocked || holds_always(d, axis) || acts_as_force(d, axis))
+    return false;
+  return is_drive(mode) == (d.maximum_force[axis] < kUnlimited);
+}
+
 ReactionSolver::Holding ReactionSolver::held_always(const Discrepancy& d, int axis) {
   Holding holding;
   holding.holds = true;

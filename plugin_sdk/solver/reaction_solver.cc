@@ -39,13 +39,6 @@ bool holds_always(const Discrepancy& d, int axis) {
   }
 }
 
-bool may_hold(const Discrepancy& d, int axis) {
-  const AxisMode mode = axis_mode(d.modes, axis);
-  if (mode == AxisMode::kFree || mode == AxisMode::kLocked || holds_always(d, axis) || acts_as_force(d, axis))
-    return false;
-  return is_drive(mode) == (d.maximum_force[axis] < kUnlimited);
-}
-
 double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   request_ = &request;
   load_bodies();

@@ -57,5 +57,35 @@ TEST(LastingContact, APencilThatFallsAboutItsFoot) {
   for (const double time_step : {1.0 / 240.0, 1e-3}) expect_to_meet(scene, 1, "Continuous", time_step);
 }
 
+// What a step's fall would move through a thin plate, or deep into it, stays on it, however it is pressed. It went through, as what
+// touches when a step begins was looked for at its end alone.
+TEST(LastingContact, WhatIsPressedOnAThinPlateStaysOnIt) {
+  const auto scene = [](double thickness, double weights, double height) {
+    return R"(
+Geometries { Geometry { Type = "Box" Id = "Die" CustomProperties { HalfExtents = {0.01, 0.01, 0.01} } }
+             Geometry { Type = "Box" Id = "Plate" CustomProperties { HalfExtents = )" +
+           literal(Vector3(1, 0.5 * thickness, 1)) + R"( } } }
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = )" +
+           literal(Vector3(0, -9.81 * weights, 0)) + R"( } } }
+Simulator { CustomProperties { Duration = 0.5 } }
+Environment { Space { Bodies {
+  Body { Id = "Plate" GeometryId = "Plate" Immovable = true KineticProperties { Position = )" +
+           literal(Vector3(0, -0.5 * thickness, 0)) + R"( } }
+  Body { Id = "Die" GeometryId = "Die" Mass = 1 Forces = {"Down"} KineticProperties { Position = )" +
+           literal(Vector3(0.3, 0.01 + height, 0.2)) + R"( } }
+} } }
+)";
+  };
+  for (const double thickness : {1e-4, 2e-3, 2e-2})
+    for (const double weights : {1.0, 10.0, 100.0})
+      for (const double height : {0.0, 0.05}) {
+        SceneRun run(scene(thickness, weights, height),
+                     {"Simulator=Continuous", set("Simulator.TimeStep", 1.0 / 60.0)});
+        run.to_end();
+        EXPECT_NEAR(run.body("Die").pose.position.y(), 0.01, 1e-9) << thickness << ' ' << weights << ' ' << height;
+        EXPECT_EQ(run.count_events(EventKind::kCollisionEnd), 0U) << thickness << ' ' << weights << ' ' << height;
+      }
+}
+
 }  // namespace
 }  // namespace gravitas
