@@ -375,6 +375,19 @@ TEST(PythonDeclaration, IsNotHiddenByWhatThePluginPrints) {
   EXPECT_EQ(check.code, 0) << check.words;
 }
 
+// It was the SDK's line alone.
+TEST(PythonDeclaration, AMistakeIsToldWithTheLineOfItsAuthor) {
+  const harness::ScratchFolder folder;
+  const std::string worker = folder.write("mistaken.py",
+                                          "from gravitas_worker import Property\n\n"
+                                          "size = Property.number('Size', 'm', requird=True)\n");
+  const Ended describe =
+      ended(kPython + " " + kGravitas + " describe " + in_shell("/usr/bin/python3 -B " + in_shell(worker)));
+  EXPECT_EQ(describe.code, 2) << describe.words;
+  EXPECT_THAT(describe.words, HasSubstr("TypeError: Property.__init__() got an unexpected keyword argument 'requird' (" +
+                                        worker + ":3)"));
+}
+
 TEST(PythonDeclaration, SaysWhichModulesAreMissingAndWhereTheyAre) {
   const std::string check = " " + kGravitas + " check ", script = in_shell(kFolder + "force_drag.py");
   const Ended none = ended(kPython + check + in_shell("/usr/bin/python3 -S " + script));
