@@ -18,6 +18,7 @@
 #include "services/recorder/json.h"
 #include "services/recorder/output_file.h"
 #include "services/run/session.h"
+#include "services/study/analysis.h"
 #include "services/study/diagram.h"
 #include "services/study/gate.h"
 #include "services/study/method.h"
@@ -27,8 +28,6 @@
 
 namespace gravitas::cli {
 namespace {
-
-constexpr double kProfileError = 1e-6;
 
 struct StudyLine {
   study::Options options;
@@ -66,8 +65,9 @@ class StudyFolder {
       write("stability.csv", study::stability_csv(study));
       write("stability.svg", study::stability_diagram(study));
     }
-    for (const study::v1::Problem& problem : study.problems()) write(problem.name() + ".svg", study::diagram(problem));
-    write("profile.svg", study::profile_diagram(study, kProfileError));
+    for (const study::v1::Problem& problem : study.problems())
+      write(problem.name() + ".svg", study::diagram(study, problem));
+    if (study::has_profiles(study)) write("profile.svg", study::profile_diagram(study));
     write("STUDY.md", study::page(study));
   }
 
