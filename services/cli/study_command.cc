@@ -185,7 +185,8 @@ void add_study(CLI::App* app, Action* action) {
       "Study a scene of your own, over its Duration and from four times its TimeStep down: its errors are measured "
       "against itself by a far finer method, so that what all its settings share stays unseen; repeatable");
   command->add_flag("--short", options.is_short,
-                    "At most three minutes: runs of at most 0.25 s of CPU, accuracies by 10 instead of sqrt(10)");
+                    "At most three minutes of CPU, which a busy machine takes longer for: runs of at most 0.25 s, "
+                    "accuracies by 10 instead of sqrt(10)");
   command->add_option("--run-seconds", options.run_seconds, "CPU that one run may take, s; 4, or 0.25 if --short")
       ->check(seconds_between(1e-3, 1e6));
   command
