@@ -180,14 +180,18 @@ std::vector<std::uint64_t> types_of(const v1::CapsuleCall& call, Slot slot) {
   return types;
 }
 
-// A type by its id, as plugins that are known call it.
-std::string type_text(std::uint64_t id, Slot slot, const std::string& own_library) {
+// A type by its id, as plugins that are known call it, among them the one that answered.
+std::string type_text(std::uint64_t id, Slot slot, const v1::CapsulePlugin& own) {
   Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());
   std::string problem;
-  if (!own_library.empty()) catalog.add_library(own_library, &problem);
+  if (!own.command().empty()) {
+    catalog.add_command(own.command(), &problem);
+  } else if (!own.library().empty()) {
+    catalog.add_library(own.library(), &problem);
+  }
   for (const std::string& name : catalog.type_names(slot))
     if (type_id(name) == id) return "'" + name + "'";
-  return fmt::format("of id {:016x}", id);
+  return fmt::format("of id {:016x} of plugin '{}', which is not to be had", id, own.name());
 }
 
 // The first of the types that a call is about which a plugin does not serve.
@@ -234,7 +238,7 @@ class Player {
     std::string& why = unserved_[{substitute, *type}];
     if (!why.empty()) return true;
     why = fmt::format("'{}' cannot take the place: it does not serve the type {}", substitute,
-                      type_text(*type, examinee.declaration.slot, capsule_.plugins()[call.plugin()].library()));
+                      type_text(*type, examinee.declaration.slot, capsule_.plugins()[call.plugin()]));
     report_->add_left_out_because(why);
     return true;
   }

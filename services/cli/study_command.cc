@@ -18,6 +18,7 @@
 #include "services/recorder/json.h"
 #include "services/recorder/output_file.h"
 #include "services/run/session.h"
+#include "services/study/analysis.h"
 #include "services/study/diagram.h"
 #include "services/study/gate.h"
 #include "services/study/method.h"
@@ -27,8 +28,6 @@
 
 namespace gravitas::cli {
 namespace {
-
-constexpr double kProfileError = 1e-6;
 
 struct StudyLine {
   study::Options options;
@@ -66,8 +65,9 @@ class StudyFolder {
       write("stability.csv", study::stability_csv(study));
       write("stability.svg", study::stability_diagram(study));
     }
-    for (const study::v1::Problem& problem : study.problems()) write(problem.name() + ".svg", study::diagram(problem));
-    write("profile.svg", study::profile_diagram(study, kProfileError));
+    for (const study::v1::Problem& problem : study.problems())
+      write(problem.name() + ".svg", study::diagram(study, problem));
+    if (study::has_profiles(study)) write("profile.svg", study::profile_diagram(study));
     write("STUDY.md", study::page(study));
   }
 
@@ -185,7 +185,8 @@ void add_study(CLI::App* app, Action* action) {
       "Study a scene of your own, over its Duration and from four times its TimeStep down: its errors are measured "
       "against itself by a far finer method, so that what all its settings share stays unseen; repeatable");
   command->add_flag("--short", options.is_short,
-                    "At most three minutes: runs of at most 0.25 s of CPU, accuracies by 10 instead of sqrt(10)");
+                    "At most three minutes of CPU, which a busy machine takes longer for: runs of at most 0.25 s, "
+                    "accuracies by 10 instead of sqrt(10)");
   command->add_option("--run-seconds", options.run_seconds, "CPU that one run may take, s; 4, or 0.25 if --short")
       ->check(seconds_between(1e-3, 1e6));
   command

@@ -103,8 +103,15 @@ std::vector<Profile> profiles(const v1::Study& study, bool has_contacts, double 
       if (const double cost = cost_of(ladder, error); std::isfinite(cost)) found->ratios.push_back(cost / best);
     }
   }
+  if (*problems < 2) return {};
   for (Profile& profile : all) std::ranges::sort(profile.ratios);
   return all;
+}
+
+bool has_profiles(const v1::Study& study) {
+  std::size_t problems = 0;
+  return !profiles(study, false, kProfileError, &problems).empty() ||
+         !profiles(study, true, kProfileError, &problems).empty();
 }
 
 double share_within(const Profile& profile, double factor, std::size_t problems) {

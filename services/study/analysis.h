@@ -30,8 +30,12 @@ struct Profile {
   std::vector<double> ratios;  // ascending, of the problems that it solves
 };
 // Over the problems whose bodies may touch, or over those where nothing can; `problems` gets how many those are that any
-// method solves. Methods that were run on one of them, in order.
+// method solves. Methods that were run on one of them, in order; none where there is a single one, which its table tells all of.
 std::vector<Profile> profiles(const v1::Study& study, bool has_contacts, double error, std::size_t* problems);
+
+// There is something for a diagram of them, to kProfileError.
+inline constexpr double kProfileError = 1e-6;
+bool has_profiles(const v1::Study& study);
 
 // Share of `problems` within `factor`.
 double share_within(const Profile& profile, double factor, std::size_t problems);

@@ -16,8 +16,9 @@ namespace gravitas::study {
 namespace {
 
 // Distinct for most eyes, and by their marks for all.
-constexpr std::array<const char*, 10> kCurveColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00",
-                                                       "#56b4e9", "#7b3fa0", "#222222", "#e69f00", "#7f7f7f"};
+constexpr std::array<const char*, 12> kCurveColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                       "#8a6d00", "#56b4e9", "#7b3fa0", "#222222",
+                                                       "#e69f00", "#7f7f7f", "#9bc400", "#a3112f"};
 constexpr double kMarkSize = 3.2, kLegendLine = 19.0, kLegendText = 29.0, kLegendLetter = 6.4;
 constexpr const char* kFaint = "stroke=\"#e4e4e4\"";
 
@@ -122,7 +123,7 @@ class Frame {
   const Chart& chart_;
 };
 
-// Colours repeat after ten, then dashed, and marks after six.
+// Colours repeat after twelve, then dashed, and marks after six.
 std::string stroke_of(std::size_t style) {
   return fmt::format("stroke=\"{}\" stroke-width=\"1.5\"{}", kCurveColours[style % kCurveColours.size()],
                      style >= kCurveColours.size() ? " stroke-dasharray=\"5 3\"" : "");

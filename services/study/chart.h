@@ -37,7 +37,7 @@ struct Chart {
   double top = 0.0, left = 0.0, width = 440.0, height = 440.0;  // points, titles of axes outside
 };
 
-// Curves look as their names in the legend do. Styles repeat after 30.
+// Curves look as their names in the legend do. Styles repeat after 24.
 std::string draw(const Chart& chart);
 std::string legend(const std::vector<Curve>& curves, double left, double top);
 double legend_width(const std::vector<Curve>& curves);

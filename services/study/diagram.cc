@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <functional>
-#include <span>
+#include <map>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "services/recorder/svg.h"
@@ -18,21 +20,50 @@ namespace {
 constexpr double kLeast = 1e-16;  // no error is shown smaller
 constexpr double kTop = 76.0, kLeft = 62.0, kGap = 66.0, kMargin = 14.0;
 
-// The same of a method in all diagrams.
-std::size_t style_of(const std::string& method) {
-  const std::span<const Method> offered = offered_methods();
-  const auto found = std::ranges::find(offered, method, &Method::name);
-  if (found != offered.end()) return static_cast<std::size_t>(found - offered.begin());
-  // others come after, by what they are called
-  std::size_t sum = 0;
-  for (const char letter : method) sum += static_cast<unsigned char>(letter);
-  return offered.size() + sum % 13;
+using Styles = std::map<std::string, std::size_t>;
+
+// Of a method that is offered, as far as it is free: its place among those that are offered beside it.
+std::optional<std::size_t> usual_style(const std::string& name) {
+  std::size_t with_contacts = 0, without = 0;
+  for (const Method& method : offered_methods()) {
+    const bool is_of_motion = (method.tasks & (kMotion | kStiff)) != 0;
+    if (method.name() == name) return is_of_motion ? without : with_contacts;
+    if (is_of_motion) ++without;
+    if ((method.tasks & kContacts) != 0) ++with_contacts;
+  }
+  return std::nullopt;
+}
+
+// The same of a method in all diagrams, another one than that of any method that stands beside it in one of them.
+Styles styles_of(const v1::Study& study) {
+  // diagrams of problems without contacts (1) and with (2)
+  const auto bit = [](const v1::Problem& problem) { return problem.has_contacts() ? 2U : 1U; };
+  std::map<std::string, unsigned> stands_in;
+  for (const v1::Problem& problem : study.problems())
+    for (const v1::Ladder& ladder : problem.ladders()) stands_in[ladder.method()] |= bit(problem);
+  Styles styles;
+  std::map<std::size_t, unsigned> taken;  // in which diagrams
+  // what others are given, those that are offered do not miss
+  for (const bool is_offered : {true, false})
+    for (const v1::Problem& problem : study.problems())
+      for (const v1::Ladder& ladder : problem.ladders()) {
+        const std::string& method = ladder.method();
+        const std::optional<std::size_t> usual = usual_style(method);
+        if (usual.has_value() != is_offered || styles.contains(method)) continue;
+        const auto is_taken = [&](std::size_t style) { return (taken[style] & stands_in[method]) != 0; };
+        std::size_t style = usual.value_or(0);
+        if (is_taken(style))
+          for (style = 0; is_taken(style);) ++style;
+        taken[style] |= stands_in[method];
+        styles[method] = style;
+      }
+  return styles;
 }
 
 using Work = std::function<double(const v1::Rung&)>;
 
-Curve curve_of(const v1::Ladder& ladder, const Work& work) {
-  Curve curve{ladder.method(), style_of(ladder.method()), {}};
+Curve curve_of(const v1::Ladder& ladder, const Styles& styles, const Work& work) {
+  Curve curve{ladder.method(), styles.at(ladder.method()), {}};
   int failed = 0, too_long = 0;
   for (const v1::Rung& rung : ladder.rungs()) {
     const double y = work(rung);
@@ -56,11 +87,11 @@ Curve curve_of(const v1::Ladder& ladder, const Work& work) {
   return curve;
 }
 
-Chart chart_of(const v1::Problem& problem, const std::string& title, const Work& work) {
+Chart chart_of(const v1::Problem& problem, const Styles& styles, const std::string& title, const Work& work) {
   Chart chart;
   std::vector<double> errors = {1.0, std::max(problem.uncertainty(), kLeast)}, costs;
   for (const v1::Ladder& ladder : problem.ladders()) {
-    chart.curves.push_back(curve_of(ladder, work));
+    chart.curves.push_back(curve_of(ladder, styles, work));
     for (const Mark& mark : chart.curves.back().marks) errors.push_back(mark.x), costs.push_back(mark.y);
     for (const double cost : chart.curves.back().failed) costs.push_back(cost);
   }
@@ -74,11 +105,12 @@ Chart chart_of(const v1::Problem& problem, const std::string& title, const Work&
 
 }  // namespace
 
-std::string diagram(const v1::Problem& problem) {
+std::string diagram(const v1::Study& study, const v1::Problem& problem) {
   const double duration = problem.duration();
-  Chart time =
-      chart_of(problem, "CPU s per simulated s", [&](const v1::Rung& rung) { return rung.cpu_median() / duration; });
-  Chart work = chart_of(problem, "evaluations per simulated s (derivatives and iterations of solvers)",
+  const Styles styles = styles_of(study);
+  Chart time = chart_of(problem, styles, "CPU s per simulated s",
+                        [&](const v1::Rung& rung) { return rung.cpu_median() / duration; });
+  Chart work = chart_of(problem, styles, "evaluations per simulated s (derivatives and iterations of solvers)",
                         [&](const v1::Rung& rung) { return evaluations(rung) / duration; });
   time.left = kLeft;
   work.left = kLeft + time.width + kGap;
@@ -92,17 +124,19 @@ std::string diagram(const v1::Problem& problem) {
   return svg_page(legend_left + legend_width(time.curves) + kMargin, kTop + time.height + 46.0, parts);
 }
 
-std::string profile_diagram(const v1::Study& study, double error) {
-  std::string parts = svg_text(14.0, 26.0, fmt::format("Share of problems solved to {:g}", error), "font-size=\"17\"");
+std::string profile_diagram(const v1::Study& study) {
+  std::string parts =
+      svg_text(14.0, 26.0, fmt::format("Share of problems solved to {:g}", kProfileError), "font-size=\"17\"");
+  const Styles styles = styles_of(study);
   double left = kLeft;
   for (const bool has_contacts : {false, true}) {
     std::size_t problems = 0;
-    const std::vector<Profile> all = profiles(study, has_contacts, error, &problems);
-    if (problems == 0) continue;
+    const std::vector<Profile> all = profiles(study, has_contacts, kProfileError, &problems);
+    if (all.empty()) continue;
     Chart chart;
     double largest = 10.0;
     for (const Profile& profile : all) {
-      Curve curve{profile.method, style_of(profile.method), {}};
+      Curve curve{profile.method, styles.at(profile.method), {}};
       curve.has_steps = true;
       for (const double ratio : profile.ratios) {
         largest = std::max(largest, ratio);

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -45,6 +47,17 @@ std::string achieved_text(const v1::Ladder& ladder) {
   return ladder.has_achieved_to_requested() ? fmt::format("{:.2g}", ladder.achieved_to_requested()) : kNone;
 }
 
+// A file's name as Markdown's links have it: in percent code, but for letters, digits and "-._~".
+std::string in_link(const std::string& name) {
+  std::string text;
+  for (const char letter : name) {
+    const auto byte = static_cast<unsigned char>(letter);
+    const bool is_plain = std::isalnum(byte) != 0 || std::strchr("-._~", letter) != nullptr;
+    text += is_plain ? std::string(1, letter) : fmt::format("%{:02X}", byte);
+  }
+  return text;
+}
+
 bool fails(const v1::Rung& rung) { return !rung.failed().empty() && !rung.too_long(); }
 
 auto failed_rungs(const v1::Ladder& ladder) { return std::ranges::count_if(ladder.rungs(), fails); }
@@ -52,11 +65,12 @@ auto long_rungs(const v1::Ladder& ladder) { return std::ranges::count_if(ladder.
 
 std::string problem_section(const v1::Problem& problem) {
   std::string text = fmt::format(
-      "\n## {0}\n\n{1}; {2:g} s. Error against: {3}, good to {4:.1g}.\n\n![error against work]({0}.svg)\n\n"
+      "\n## {0}\n\n{1}; {2:g} s. Error against: {3}, good to {4:.1g}.\n\n![error against work]({5}.svg)\n\n"
       "| method | 1e-3 | 1e-6 | 1e-9 | best error | order, theory | observed | achieved / requested | rungs | failed | "
       "too long |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-      problem.name(), problem.family(), problem.duration(), problem.reference(), problem.uncertainty());
+      problem.name(), problem.family(), problem.duration(), problem.reference(), problem.uncertainty(),
+      in_link(problem.name()));
   for (const v1::Ladder& ladder : problem.ladders())
     text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", ladder.method(),
                         fmt::join(times_to(ladder), " | "), best_text(ladder, problem.uncertainty()),
@@ -85,7 +99,7 @@ std::string profile_section(const v1::Study& study) {
     for (const double error : kWantedErrors) {
       std::size_t problems = 0;
       const std::vector<Profile> all = profiles(study, has_contacts, error, &problems);
-      if (problems < 2) continue;
+      if (all.empty()) continue;
       text += fmt::format(
           "\n{} problems {} contacts, to {:g}:\n\n| method | fastest | within 2 | within 4 | within 16 | at all |\n"
           "| --- | --- | --- | --- | --- | --- |\n",
@@ -100,9 +114,8 @@ std::string profile_section(const v1::Study& study) {
     }
   if (text.empty()) return text;
   return "\n## Over all problems\n\nShare of the problems on which a method costs at most so many times the CPU of the "
-         "cheapest one (profiles of Dolan\nand More); problems that no method solves so well are left out.\n\n"
-         "![profiles](profile.svg)\n" +
-         text;
+         "cheapest one (profiles of Dolan\nand More); problems that no method solves so well are left out.\n" +
+         std::string(has_profiles(study) ? "\n![profiles](profile.svg)\n" : "") + text;
 }
 
 std::string limit_text(const v1::Limit& limit) {

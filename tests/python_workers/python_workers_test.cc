@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -335,6 +336,35 @@ TEST(PythonSolver, GivesTheSameBitsAgain) {
   EXPECT_EQ(outcome_of(scene("stack.gravitas"), overrides).chain, outcome_of(scene("stack.gravitas"), overrides).chain);
 }
 
+// Types that no installed plugin has were told by their number.
+TEST(PythonForce, ItsTypeIsNamedWhereAnotherCannotTakeThePlace) {
+  const harness::ScratchFolder folder;
+  const std::string capsule = in_shell(folder.path("syrup.capsule"));
+  const std::string worker =
+      folder.write("syrup.py", "import sys\nsys.path.append('" + kFolder +
+                                   "')\nfrom force_drag import Drag\nfrom gravitas_worker import Type, main\n"
+                                   "class Syrup(Drag):\n"
+                                   "  name = 'PythonSyrup'\n"
+                                   "  types = [Type('Syrup', 'Slow.', Drag.types[0].properties)]\n"
+                                   "main(Syrup)\n");
+  const std::string scene = folder.write("scene.gravitas", R"(
+    Forces { Force { Type = "Syrup" Id = "Oil" CustomProperties { LinearCoefficient = 2 } } }
+    Environment {
+      KineticIntegrator = "SemiImplicitEuler"
+      Space { Bodies { Body { Id = "Ball" Mass = 1 PrincipalMoments = {1, 1, 1} Forces = {"Oil"} } } }
+    }
+    Plugins { Plugin { Slot = "force" Hosting = "grpc" Command = "/usr/bin/python3 -B syrup.py" } })");
+  const Ended captured = ended(kGravitas + " capture " + in_shell(scene) + " --slot force --steps 1 --out " + capsule);
+  ASSERT_EQ(captured.code, 0) << captured.words;
+  const std::string replay = kGravitas + " replay " + capsule + " --plugin Gravity";
+  const Ended named = ended(replay);
+  EXPECT_EQ(named.code, 2) << named.words;
+  EXPECT_THAT(named.words, HasSubstr("'Gravity' cannot take the place: it does not serve the type 'Syrup'"));
+  std::filesystem::remove(worker);
+  EXPECT_THAT(ended(replay).words,
+              testing::ContainsRegex("type of id [0-9a-f]+ of plugin 'PythonSyrup', which is not to be had"));
+}
+
 // ---- the kit
 
 class PythonWorker : public ::testing::TestWithParam<const char*> {};
@@ -373,6 +403,20 @@ TEST(PythonDeclaration, IsNotHiddenByWhatThePluginPrints) {
   const Ended check = ended(kPython + " " + kGravitas + " check " +
                             in_shell("/usr/bin/python3 -B " + in_shell(worker)) + " --case handshake/magic");
   EXPECT_EQ(check.code, 0) << check.words;
+}
+
+// It was the SDK's line alone.
+TEST(PythonDeclaration, AMistakeIsToldWithTheLineOfItsAuthor) {
+  const harness::ScratchFolder folder;
+  const std::string worker = folder.write("mistaken.py",
+                                          "from gravitas_worker import Property\n\n"
+                                          "size = Property.number('Size', 'm', requird=True)\n");
+  const Ended describe =
+      ended(kPython + " " + kGravitas + " describe " + in_shell("/usr/bin/python3 -B " + in_shell(worker)));
+  EXPECT_EQ(describe.code, 2) << describe.words;
+  EXPECT_THAT(
+      describe.words,
+      HasSubstr("TypeError: Property.__init__() got an unexpected keyword argument 'requird' (" + worker + ":3)"));
 }
 
 TEST(PythonDeclaration, SaysWhichModulesAreMissingAndWhereTheyAre) {

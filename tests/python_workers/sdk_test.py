@@ -159,7 +159,7 @@ class Columns(unittest.TestCase):
 class Declarations(unittest.TestCase):
     PROPERTIES = [
         Property.number("Radius", "m", above=0.0, required=True), Property.integer("Count", at_most=9, default=3),
-        Property.flag("On", default=0), Property.choice("Frame", ["World", "Body"], default=0),
+        Property.flag("On", default=0), Property.choice("Frame", ["World", "Body"], default="Body"),
         Property.vector("Axis", "1", "world"), Property.table("Table", 2, "s", "world")]
 
     def test_values_are_read_in_the_order_of_declaration(self):
@@ -198,6 +198,13 @@ class Declarations(unittest.TestCase):
                               ([1, 0, 0, 0, 0xFFFFFFFF], "Carrier")):
             with self.assertRaisesRegex(Refusal, name):
                 Values(properties, numpy.array(numbers, float))
+
+    def test_the_default_of_a_choice_is_named_as_in_scenes(self):
+        self.assertEqual(self.PROPERTIES[3].message.default_numbers, [1])
+        with self.assertRaisesRegex(ValueError, 'Frame: the default is "Wall"; allowed: "World", "Body"'):
+            Property.choice("Frame", ["World", "Body"], default="Wall")
+        with self.assertRaisesRegex(ValueError, 'Count: the default is "many"; allowed: numbers'):
+            Property.integer("Count", default="many")
 
     def test_type_ids_are_fnv_1a(self):
         self.assertEqual(type_id(""), 0xCBF29CE484222325)

@@ -32,11 +32,12 @@ MARK_SECONDS = 0.02
 LARGEST_ASSET = 1 << 31
 
 
-def place_of(failure):
-    """The plugin's own line that raised, or led to what did, as ' (FILE:LINE)'."""
+def words_of(failure):
+    """What failed, and the plugin's own line that raised or led to it: 'KIND: WHAT (FILE:LINE)'."""
     frames = traceback.extract_tb(failure.__traceback__)
     own = [frame for frame in frames if not frame.filename.startswith((_PACKAGE, *_INSTALLED))]
-    return f" ({own[-1].filename}:{own[-1].lineno})" if own else ""
+    place = f" ({own[-1].filename}:{own[-1].lineno})" if own else ""
+    return f"{type(failure).__name__}: {failure}{place}"
 
 
 def encodable(text):
@@ -205,8 +206,7 @@ class Session:
                 call.reply(None, status=failure.status, text=str(failure))
             except BaseException as failure:  # sys.exit() would end this thread alone, and nobody would know
                 traceback.print_exc()
-                call.reply(None, status=Outcome.STATUS_FAILED,
-                           text=f"{type(failure).__name__}: {failure}{place_of(failure)}")
+                call.reply(None, status=Outcome.STATUS_FAILED, text=words_of(failure))
             self.calls += 1
 
     def _answer(self, call, message):

@@ -34,11 +34,17 @@ class Property:
     """A property of a type or of the plugin. Make it with the function of its kind:
 
     Property.number("Radius", "m", above=0.0, required=True, meaning="Radius of the sphere.")
+    Property.choice("Frame", ["World", "Body"], default="World", meaning="Axes of the vector.")
     """
 
     def __init__(self, name, kind, size, *, unit="1", frame="", at_least=-math.inf, above=None, at_most=math.inf,
                  required=False, default=None, live=False, meaning="", choices=(), columns=0):
         self.name, self.size, self.columns = name, size, columns
+        if isinstance(default, str):
+            if default not in choices:
+                allowed = ", ".join(f'"{choice}"' for choice in choices) or "numbers"
+                raise ValueError(f'{name}: the default is "{default}"; allowed: {allowed}')
+            default = choices.index(default)
         numbers = [] if default is None else [float(x) for x in numpy.atleast_1d(default)]
         self.message = description_pb2.Property(
             name=name, kind=kind, unit=unit, frame=frame, minimum=at_least if above is None else above,

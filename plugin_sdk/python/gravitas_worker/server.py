@@ -21,7 +21,7 @@ from google.protobuf.message import DecodeError
 from gravitas.control.v1 import control_pb2
 from gravitas.plugin.v1 import description_pb2
 
-from .call import CallFailed, Outcome, Sent, Session, encodable, place_of, unread_call
+from .call import CallFailed, Outcome, Sent, Session, encodable, unread_call, words_of
 from .columns import WireError, stage_methods
 from .declaration import Refusal, description_of
 
@@ -47,6 +47,13 @@ _DESCRIBES = sys.argv[-1:] == ["--describe"]
 if _DESCRIBES:
     _declaration_file = os.dup(1)
     os.dup2(2, 1)
+
+    def _tell_failure(kind, failure, trace):
+        """Whoever asked shows the last line alone: it names the plugin's, where the stack may end in the SDK."""
+        sys.__excepthook__(kind, failure, trace)
+        print(words_of(failure), file=sys.stderr)
+
+    sys.excepthook = _tell_failure
 
 
 class Worker(grpc.GenericRpcHandler):
@@ -90,7 +97,7 @@ class Worker(grpc.GenericRpcHandler):
                 self._taken.release()
                 traceback.print_exc()
                 refusal = (_Reason.REASON_SETTINGS,
-                           f"{self._plugin.name}: it cannot be made: {type(failure).__name__}: {failure}{place_of(failure)}")
+                           f"{self._plugin.name}: it cannot be made: {words_of(failure)}")
         if refusal is not None:
             yield _worker_message(refusal=_Reason(reason=refusal[0], text=encodable(refusal[1])))
             return

@@ -10,12 +10,14 @@
 #include <filesystem>
 #include <initializer_list>
 #include <regex>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "services/run/session.h"
 #include "services/study/analysis.h"
 #include "services/study/diagram.h"
+#include "services/study/method.h"
 #include "services/study/tables.h"
 #include "tests/services/cli/program.h"
 
@@ -200,12 +202,15 @@ TEST(StudyGate, FilesAreReadLineByLine) {
   EXPECT_GT(built_in_demands().size(), 30U);
 }
 
+// Of its first problem.
+std::string drawing_of(const v1::Study& study) { return diagram(study, study.problems(0)); }
+
 // As many marks as rungs that were run in either panel, and what failed is hollow.
 TEST(StudyDiagram, ShowsEveryRun) {
   const std::string with_circles = "Basic/SemiImplicitEuler/Sequential";
   v1::Ladder ladder = ladder_of(with_circles, 2.0, 1.0);
   ladder.mutable_rungs(0)->set_failed("it fell over");
-  const std::string drawing = diagram(study_with({ladder}).problems(0));
+  const std::string drawing = drawing_of(study_with({ladder}));
   const auto count = [&](const std::string& part) {
     std::size_t found = 0;
     for (std::size_t at = drawing.find(part); at != std::string::npos; at = drawing.find(part, at + 1)) ++found;
@@ -226,7 +231,7 @@ TEST(StudyDiagram, LabelsCoverNeitherMarksNorEachOther) {
     *study.mutable_problems(0)->add_ladders() = ladder_of("Smooth/SymplecticSplitting4/Direct", 0.02, cost);
     *study.mutable_problems(0)->add_ladders() = ladder_of("Substepping/Verlet/Newton", 0.03, cost);
   }
-  const std::string drawing = diagram(study.problems(0));
+  const std::string drawing = drawing_of(study);
   struct Box {
     double left, bottom, width;
   };
@@ -253,18 +258,68 @@ TEST(StudyDiagram, LabelsCoverNeitherMarksNorEachOther) {
   EXPECT_NE(drawing.find("stroke-width=\"0.6\""), std::string::npos);  // what leads to those that are far
 }
 
-// A method looks the same whatever stands beside it.
+// How a method's line in the legend is drawn.
+std::string stroke_in(const std::string& drawing, const std::string& method) {
+  const std::size_t word = drawing.find(">" + method + "<"), line = drawing.rfind("<line", word);
+  EXPECT_NE(word, std::string::npos) << method;
+  const std::size_t stroke = drawing.find("stroke=", line);
+  return drawing.substr(stroke, drawing.find("/>", stroke) - stroke);
+}
+
+// A method that is offered looks the same whatever is offered beside it.
 TEST(StudyDiagram, MethodsLookTheSameInAll) {
-  const std::string alone = diagram(study_with({ladder_of("Smooth/RK4/Direct", 2.0, 1.0)}).problems(0));
-  const std::string beside = diagram(
-      study_with({ladder_of("Smooth/Verlet/Direct", 1.0, 3.0), ladder_of("Smooth/RK4/Direct", 2.0, 1.0)}).problems(0));
-  const auto line_of = [](const std::string& drawing, const std::string& name) {
-    const std::size_t word = drawing.find(">" + name + "<"), line = drawing.rfind("<line", word);
-    const std::size_t stroke = drawing.find("stroke=", line);
-    return drawing.substr(stroke, drawing.find("/>", stroke) - stroke);
-  };
-  EXPECT_EQ(line_of(alone, "Smooth/RK4/Direct"), line_of(beside, "Smooth/RK4/Direct"));
-  EXPECT_NE(line_of(beside, "Smooth/Verlet/Direct"), line_of(beside, "Smooth/RK4/Direct"));
+  const std::string alone = drawing_of(study_with({ladder_of("Smooth/RK4/Direct", 2.0, 1.0)}));
+  const std::string beside =
+      drawing_of(study_with({ladder_of("Smooth/Verlet/Direct", 1.0, 3.0), ladder_of("Smooth/RK4/Direct", 2.0, 1.0)}));
+  EXPECT_EQ(stroke_in(alone, "Smooth/RK4/Direct"), stroke_in(beside, "Smooth/RK4/Direct"));
+  EXPECT_NE(stroke_in(beside, "Smooth/Verlet/Direct"), stroke_in(beside, "Smooth/RK4/Direct"));
+}
+
+std::string colour_in(const std::string& drawing, const std::string& method) {
+  return stroke_in(drawing, method).substr(0, std::string("stroke=\"#000000\"").size());
+}
+
+// Two of three had the same colour where they are not offered beside each other.
+TEST(StudyDiagram, MethodsOfADiagramHaveColoursOfTheirOwn) {
+  std::vector<std::string> with_contacts, without;
+  for (const Method& method : offered_methods()) {
+    if ((method.tasks & kContacts) != 0) with_contacts.push_back(method.name());
+    if (method.tasks != kContacts) without.push_back(method.name());
+  }
+  for (const std::vector<std::string>& methods :
+       {std::vector<std::string>{"Smooth/RK4/Direct", "Continuous/Verlet/Newton", "Basic/SemiImplicitEuler/Sequential",
+                                 "Smooth/Rosenbrock/Direct", "Smooth/RKMK4/Direct", "Basic/Own/Newton"},
+        with_contacts, without}) {
+    v1::Study study = study_with({});
+    for (const std::string& method : methods) *study.mutable_problems(0)->add_ladders() = ladder_of(method, 2.0, 1.0);
+    const std::string drawing = drawing_of(study);
+    std::set<std::string> colours;
+    for (const std::string& method : methods) colours.insert(colour_in(drawing, method));
+    EXPECT_EQ(colours.size(), methods.size()) << methods[0];
+  }
+}
+
+// One problem's table has all of it: there was a drawing with a cut title and nothing else.
+TEST(StudyDiagram, ASingleProblemHasNoProfile) {
+  v1::Study study = study_with({ladder_of("A", 1.5, 1.0)});
+  EXPECT_FALSE(has_profiles(study));
+  *study.add_problems() = study_with({ladder_of("A", 1.5, 1.0)}, "bounce").problems(0);
+  study.mutable_problems(1)->set_has_contacts(true);
+  EXPECT_FALSE(has_profiles(study));
+  EXPECT_THAT(page(study), Not(HasSubstr("Over all problems")));
+  *study.add_problems() = study_with({ladder_of("A", 1.5, 1.0)}, "bar").problems(0);
+  EXPECT_FALSE(has_profiles(study));  // to 1e-6
+  EXPECT_THAT(page(study), AllOf(HasSubstr("\n2 problems without contacts, to 0.001:"), Not(HasSubstr("profile.svg"))));
+  for (const int i : {0, 2}) *study.mutable_problems(i)->mutable_ladders(0) = ladder_of("A", 2.0, 1.0);
+  EXPECT_TRUE(has_profiles(study));
+  EXPECT_THAT(page(study), HasSubstr("![profiles](profile.svg)"));
+  EXPECT_THAT(profile_diagram(study), AllOf(HasSubstr("2 problems without contacts"), Not(HasSubstr("1 problems"))));
+}
+
+TEST(StudyPage, LinksToFilesOfAnyName) {
+  const v1::Study study = study_with({ladder_of("A", 2.0, 1.0)}, "my | sc,ene (1) é");
+  EXPECT_THAT(page(study), AllOf(HasSubstr("\n## my | sc,ene (1) é\n"),
+                                 HasSubstr("](my%20%7C%20sc%2Cene%20%281%29%20%C3%A9.svg)\n")));
 }
 
 // ---- the program
@@ -280,8 +335,9 @@ TEST(StudyProgram, WritesWhatItMeasuredAndFailsByItsGate) {
   // the built-in demands are of whole ladders
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("the gate demands nothing of what was run"));
-  for (const char* file : {"study.csv", "STUDY.md", "point_pendulum.svg", "bounce.svg", "profile.svg"})
+  for (const char* file : {"study.csv", "STUDY.md", "point_pendulum.svg", "bounce.svg"})
     EXPECT_TRUE(std::filesystem::exists(out + "/" + file)) << file;
+  EXPECT_FALSE(std::filesystem::exists(out + "/profile.svg"));
   EXPECT_THAT(read_file(out + "/STUDY.md"), AllOf(HasSubstr("## bounce"), HasSubstr("Gate: the gate demands nothing")));
   EXPECT_THAT(read_file(out + "/study.csv"), HasSubstr("\npoint_pendulum,smooth,Smooth/RK4/Direct,TimeStep,0.25,"));
 
