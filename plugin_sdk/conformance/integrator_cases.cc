@@ -165,6 +165,26 @@ void judge_constant_force(Subject& subject) {
   }
 }
 
+// A force that stays acts as an impulse of each step: what it adds to the velocity moves the pose by the share theta.
+void judge_theta(Subject& subject) {
+  constexpr double h = 0.1;
+  FreeBodies free;
+  free.time_step = h;
+  free.bodies = {FreeBody{.mass = 2.0, .wrench = {.force = Vector3(2, -4, 6)}}};
+  free.bodies[0].state.twist.linear = Vector3(0, 3, 1);
+  Inquiry inquiry(subject, "2 kg under (2, -4, 6) N, v = (0, 3, 1), h = 0.1, in its fourth step");
+  // a method with history may start by another
+  free.steps(&inquiry, 3);
+  const BodyState before = free.bodies[0].state;
+  free.step(&inquiry);
+  const BodyState& after = free.bodies[0].state;
+  const Vector3 change = after.twist.linear - before.twist.linear;
+  const Vector3 by_change = after.pose.position - before.pose.position - h * before.twist.linear;
+  const double allowed = (10.0 * kRounding + accuracy_of(subject.declaration())) / (h * change.norm());
+  inquiry.expect_near("declared theta (against (x' - x - h v) / (h (v' - v)))", subject.declaration().theta,
+                      by_change.dot(change) / (h * change.squaredNorm()), allowed);
+}
+
 void judge_constant_torque(Subject& subject) {
   const double order = order_of(subject.declaration());
   Draw draw(23);
@@ -531,6 +551,7 @@ std::vector<Case> integrator_cases(const PluginDeclaration&) {
                 judge_kinematic),
       make_case("integrator/constant-force", "A constant force gives the velocity exactly, the parabola to the order.",
                 judge_constant_force),
+      make_case("integrator/theta", "What a force adds to velocities moves poses by the declared theta.", judge_theta),
       make_case("integrator/constant-torque", "A torque about a principal axis gives the angular velocity tau h / I.",
                 judge_constant_torque),
       make_case("integrator/damping", "Damping c leaves exp(-c h) of both velocities.", judge_damping),

@@ -101,6 +101,7 @@ const Wrong kWrong[] = {
      {"solver/reactions", "solver/reactions_hanging", "solver/reactions_springs"},
      "relative acceleration of the points"},
     {"integrator_drifts", {"integrator/rotor"}, "change of its angular momentum"},
+    {"integrator_wrong_theta", {"integrator/theta"}, "declared theta (against (x' - x - h v) / (h (v' - v))) is 0"},
 };
 
 INSTANTIATE_TEST_SUITE_P(Tree, WrongPlugin, testing::ValuesIn(kWrong),
