@@ -182,18 +182,21 @@ void judge_constraint_frames(Subject& subject) {
   }
 }
 
-// The world is a body at the origin that does not move.
+// The world is a body at the origin that does not move, and no other body.
 void judge_world(Subject& subject) {
   Draw draw(44);
   for (const TypeDeclaration& type : joint_types_of(subject)) {
     Joints by_world = joined(type, &draw);
-    by_world.bodies[0] = {};
-    Joints by_body = by_world;
     by_world.joints[0].body1 = kNone;
+    Joints by_body = by_world;
+    by_body.bodies.emplace_back();
+    by_body.joints[0].body1 = 2;
     Inquiry inquiry(subject, type.name + " to the world, and to a body at rest at the origin");
     by_world.bind(&inquiry), by_body.bind(&inquiry);
-    const Pose moved = displaced(by_world.bodies[1].pose, draw.vector(0.1), draw.vector(0.1));
-    by_world.bodies[1].pose = by_body.bodies[1].pose = moved;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Pose moved = displaced(by_world.bodies[i].pose, draw.vector(0.1), draw.vector(0.1));
+      by_world.bodies[i].pose = by_body.bodies[i].pose = moved;
+    }
     const std::vector<DescribedJoint> a = by_world.describe(&inquiry), b = by_body.describe(&inquiry);
     inquiry.expect(a.size() == b.size(),
                    "has " + std::to_string(a.size()) + " discrepancies instead of " + std::to_string(b.size()));
@@ -204,6 +207,63 @@ void judge_world(Subject& subject) {
       inquiry.expect_near("velocity" + of, a[i].discrepancy.velocity, b[i].discrepancy.velocity, 10 * kJointRounding);
     }
   }
+}
+
+// Each body joined to the one before it, or on either side to the world, by joints of all types in turn.
+Joints chain_of(const std::vector<TypeDeclaration>& types, std::uint32_t count, Draw* draw) {
+  Joints chain;
+  for (std::uint32_t i = 0; i < count && !types.empty(); ++i) {
+    chain.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
+    const TypeDeclaration& type = types[i % types.size()];
+    const std::uint32_t other = i % 10 == 0 ? kNone : i - 1;
+    const bool is_first = i % 20 == 10;
+    chain.joints.push_back({.type = type_id(type.name),
+                            .body1 = is_first ? i : other,
+                            .body2 = is_first ? other : i,
+                            .properties = sample_values(type.properties, draw)});
+  }
+  return chain;
+}
+
+void expect_same(const Inquiry& inquiry, const Discrepancy& came, const Discrepancy& right) {
+  inquiry.expect_near("point1", came.point1, right.point1, 0.0);
+  inquiry.expect_near("point2", came.point2, right.point2, 0.0);
+  inquiry.expect_near("velocity", came.velocity, right.velocity, 0.0);
+  inquiry.expect(came.modes == right.modes && came.axes.coeffs() == right.axes.coeffs(), "has other modes or axes");
+}
+
+// Of hundreds of joints: the same ones in other rows, between the same bodies in other rows.
+void judge_constraint_permutation(Subject& subject) {
+  Draw draw(50);
+  Joints plain = chain_of(joint_types_of(subject), 300, &draw);
+  const std::size_t count = plain.joints.size();
+  const std::vector<std::uint32_t> place = draw.order(count), row = draw.order(count);
+  const auto renamed = [&](std::uint32_t body) { return body == kNone ? kNone : place[body]; };
+  Joints mixed = plain;
+  for (std::size_t i = 0; i < count; ++i) {
+    Joint& joint = mixed.joints[row[i]] = plain.joints[i];
+    joint.body1 = renamed(joint.body1), joint.body2 = renamed(joint.body2);
+    mixed.bodies[place[i]] = plain.bodies[i];
+  }
+  Inquiry inquiry(subject, std::to_string(count) + " joints, and the same in other rows");
+  plain.bind(&inquiry), mixed.bind(&inquiry);
+  for (std::size_t i = 0; i < count; ++i) {
+    JointedBody& body = plain.bodies[i];
+    body.pose = displaced(body.pose, draw.vector(0.1), draw.vector(0.1));
+    mixed.bodies[place[i]] = body;
+  }
+  std::vector<std::vector<Discrepancy>> right(count);
+  for (const DescribedJoint& one : plain.describe(&inquiry)) right[row[one.joint]].push_back(one.discrepancy);
+  std::vector<std::size_t> described(count, 0);
+  for (const DescribedJoint& one : mixed.describe(&inquiry)) {
+    const std::size_t next = described[one.joint]++;
+    inquiry.now_asked("joint " + std::to_string(one.joint) + " of " + std::to_string(count) +
+                      ", and the same in another row");
+    inquiry.expect(next < right[one.joint].size(), "has more discrepancies");
+    expect_same(inquiry, one.discrepancy, right[one.joint][next]);
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    inquiry.expect(described[i] == right[i].size(), "joint " + std::to_string(i) + " has fewer discrepancies");
 }
 
 // Many joints at once, one of them broken: each as if it were alone.
@@ -240,11 +300,7 @@ void judge_constraint_independence(Subject& subject) {
     alone.bodies = moved;
     for (const DescribedJoint& one : alone.describe(&inquiry)) {
       inquiry.expect(next < together.size() && together[next].joint == j, "has fewer discrepancies among the others");
-      const Discrepancy &a = together[next++].discrepancy, &b = one.discrepancy;
-      inquiry.expect_near("point1", a.point1, b.point1, 0.0);
-      inquiry.expect_near("point2", a.point2, b.point2, 0.0);
-      inquiry.expect_near("velocity", a.velocity, b.velocity, 0.0);
-      inquiry.expect(a.modes == b.modes && a.axes.coeffs() == b.axes.coeffs(), "has other modes or axes");
+      expect_same(inquiry, together[next++].discrepancy, one.discrepancy);
     }
   }
   inquiry.now_asked(std::to_string(all.joints.size()) + " joints, number " + std::to_string(broken) + " broken");
@@ -395,6 +451,8 @@ std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
       make_case("constraint/world", "The world is a body at the origin, at rest.", judge_world),
       make_case("constraint/independence", "Each joint is described for itself; a broken one not at all.",
                 judge_constraint_independence),
+      make_case("constraint/permutation", "The order of bodies and joints changes no bit of a joint.",
+                judge_constraint_permutation),
       make_case("constraint/displacement", "A body moved from its joint is as wrong as it was moved.",
                 judge_displacement),
       make_case("constraint/refusals", "Bodies that do not exist and types that were not declared are refused.",
@@ -416,15 +474,7 @@ std::vector<Question> constraint_questions(Subject& subject, Draw* draw) {
   const std::vector<TypeDeclaration> types = joint_types_of(subject);
   if (types.empty()) return questions;
   for (const std::uint32_t count : {1U, 12U, 100U}) {
-    Joints chain;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      chain.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
-      const TypeDeclaration& type = types[i % types.size()];
-      chain.joints.push_back({.type = type_id(type.name),
-                              .body1 = i == 0 ? kNone : i - 1,
-                              .body2 = i,
-                              .properties = sample_values(type.properties, draw)});
-    }
+    Joints chain = chain_of(types, count, draw);
     const std::string joints = std::to_string(count) + " joints";
     questions.push_back({"binding " + joints, stage::Method::kConstraintBind, chain.bind_request(), {}});
     try {

@@ -23,6 +23,7 @@ struct PushedBody {
   Pose geometry = {};
   Pose pose = {};
   Twist twist = {};
+  std::uint32_t shape = 0;
 };
 
 // Forces, bodies, and who acts on whom.
@@ -60,9 +61,9 @@ class Forces {
       append(&columns.f64("orientation"), body.pose.orientation);
       append(&columns.f64("linear_velocity"), body.twist.linear);
       append(&columns.f64("angular_velocity"), body.twist.angular);
-      columns.u32("body_shape").push_back(static_cast<std::uint32_t>(columns.u32("body_shape").size() % 2));
+      columns.u32("body_shape").push_back(body.shape);
     }
-    // a ball and a box, in turn
+    // a ball and a box
     columns.u64("shape_type") = {type_id("Sphere"), type_id("Box")};
     columns.u32("shape_parameter_begin") = {0, 1, 4};
     columns.f64("shape_parameter") = {0.5, 0.3, 0.4, 0.5};
@@ -115,7 +116,10 @@ Forces mixture(Subject& subject, std::size_t bodies, Draw* draw) {
   const std::vector<TypeDeclaration> types = force_types_of(subject);
   Forces forces;
   forces.time = 0.4;
-  for (std::size_t i = 0; i < bodies; ++i) forces.bodies.push_back(random_body(draw));
+  for (std::uint32_t i = 0; i < bodies; ++i) {
+    forces.bodies.push_back(random_body(draw));
+    forces.bodies.back().shape = i % 2;
+  }
   for (int copy = 0; copy < 2; ++copy)
     for (const TypeDeclaration& type : types)
       forces.add_force(type_id(type.name), sample_values(type.properties, draw));
@@ -166,6 +170,36 @@ void judge_force_independence(Subject& subject) {
       inquiry.expect_equal(std::string(column) + " in another order",
                            std::span(reversed.f64(column)).subspan((count - 1 - i) * width, width), right);
     }
+  }
+}
+
+// Of hundreds of bodies and applications: the same ones in other rows.
+void judge_force_permutation(Subject& subject) {
+  Draw draw(38);
+  const std::size_t bodies = 300;
+  const Forces plain = mixture(subject, bodies, &draw);
+  const std::size_t count = plain.applications.size() / 2;
+  const std::vector<std::uint32_t> place = draw.order(bodies), row = draw.order(count);
+  Forces mixed = plain;
+  for (std::size_t i = 0; i < bodies; ++i) mixed.bodies[place[i]] = plain.bodies[i];
+  for (std::size_t i = 0; i < count; ++i) {
+    mixed.applications[2 * row[i]] = plain.applications[2 * i];
+    mixed.applications[2 * row[i] + 1] = place[plain.applications[2 * i + 1]];
+  }
+  for (std::size_t force = 0; force < plain.types.size(); ++force)
+    for (const TypeDeclaration& type : subject.declaration().types)
+      if (type_id(type.name) == plain.types[force]) rename_bodies(type.properties, place, &mixed.parameters[force]);
+  Inquiry inquiry(subject, std::to_string(count) + " applications to 300 bodies, and the same in other rows");
+  const std::vector<ForceAnswer> a = ask(&inquiry, plain), b = ask(&inquiry, mixed);
+  for (std::size_t i = 0; i < count; ++i) {
+    const ForceAnswer &one = a[i], &other = b[row[i]];
+    const std::string of = " of application " + std::to_string(i) + " in another row";
+    // a plugin may sum over all bodies
+    const auto tolerance = [](const Wrench& w) { return 1e-11 * (1.0 + w.force.norm() + w.torque.norm()); };
+    expect_wrench(inquiry, of, other.wrench, one.wrench, tolerance(one.wrench));
+    expect_wrench(inquiry, " impulse" + of, other.impulse, one.impulse, tolerance(one.impulse));
+    inquiry.expect_near("potential" + of, other.potential, one.potential, 1e-11 * (1.0 + std::fabs(one.potential)));
+    inquiry.expect(other.flags == one.flags, "flags" + of + " are others");
   }
 }
 
@@ -233,6 +267,7 @@ void judge_force_hostile(Subject& subject) {
   for (const TypeDeclaration& type : force_types_of(subject)) {
     Forces forces;
     forces.bodies = {random_body(&draw), random_body(&draw)};
+    forces.bodies[1].shape = 1;
     forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
     forces.apply(0, 0);
     forces.apply(0, 1);
@@ -442,6 +477,8 @@ std::vector<Case> force_cases(const PluginDeclaration& declaration) {
       make_case("force/nothing", "Without an application there is no row.", judge_force_nothing),
       make_case("force/independence", "Each application is answered for itself, in any order, bit for bit.",
                 judge_force_independence),
+      make_case("force/permutation", "The order of bodies and applications changes no wrench.",
+                judge_force_permutation),
       make_case("force/constant", "A wrench said to be constant is the same in every state.", judge_constant),
       make_case("force/potential", "Force and torque are the slope of the potential.", judge_potential),
       make_case("force/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",

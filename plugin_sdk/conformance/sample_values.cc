@@ -67,6 +67,11 @@ void append_drawn(const Property& p, const Matrix3& axes, int* next_axis, Draw* 
   }
 }
 
+// Of a property whose values begin there.
+std::size_t size_at(const Property& p, const double* values) {
+  return p.kind == PropertyKind::kTable ? 1 + static_cast<std::size_t>(*values) * p.columns : p.flat_size();
+}
+
 }  // namespace
 
 std::vector<double> sample_values(const std::vector<Property>& properties, Draw* draw) {
@@ -98,9 +103,19 @@ std::vector<double> with_directions(const std::vector<Property>& properties, con
     if (is_direction && std::isnan(numbers[at]))
       for (int k = 0; k < 3; ++k) numbers[at + static_cast<std::size_t>(k)] = axes(k, next_axis % 3);
     if (is_direction) ++next_axis;
-    at += p.kind == PropertyKind::kTable ? 1 + static_cast<std::size_t>(numbers[at]) * p.columns : p.flat_size();
+    at += size_at(p, &numbers[at]);
   }
   return numbers;
+}
+
+void rename_bodies(const std::vector<Property>& properties, std::span<const std::uint32_t> place,
+                   std::vector<double>* values) {
+  std::size_t at = 0;
+  for (const Property& p : properties) {
+    double& first = (*values)[at];
+    at += size_at(p, &first);
+    if (p.kind == PropertyKind::kBody && !std::isnan(first)) first = place[static_cast<std::size_t>(first)];
+  }
 }
 
 std::vector<double> default_settings(const PluginDeclaration& declaration) {

@@ -24,6 +24,10 @@ std::vector<double> sample_values(const std::vector<Property>& properties, Draw*
 std::vector<double> with_directions(const std::vector<Property>& properties, const std::vector<double>& values,
                                     Draw* draw);
 
+// Numbers of properties that name bodies by their rows, after these have got new places.
+void rename_bodies(const std::vector<Property>& properties, std::span<const std::uint32_t> place,
+                   std::vector<double>* values);
+
 // The settings of a plugin that a scene says nothing about.
 std::vector<double> default_settings(const PluginDeclaration& declaration);
 

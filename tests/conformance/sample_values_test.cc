@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "plugin_sdk/conformance/inquiry.h"
@@ -100,6 +101,24 @@ TEST(SampleValues, TablesKeepTheirBoundsAndAscend) {
     EXPECT_EQ(check_flattened(properties, values), "");
     for (std::size_t row = 1; row < 8; ++row) EXPECT_GT(values[1 + 2 * row], values[1 + 2 * (row - 1)]);
   }
+}
+
+TEST(RenamedBodies, HaveTheirNewRows) {
+  const std::vector<Property> properties = {Property::table("Curve", 2, "1", "world"), Property::body("Anchor"),
+                                            Property::number("Length", "m"), Property::body("Other")};
+  std::vector<double> values = {1.0, 5.0, 6.0, 2.0, 0.5, std::nan("")};
+  const std::uint32_t place[] = {2, 0, 1};
+  rename_bodies(properties, place, &values);
+  EXPECT_EQ(std::vector<double>(values.begin(), values.begin() + 5), (std::vector<double>{1.0, 5.0, 6.0, 1.0, 0.5}));
+  EXPECT_TRUE(std::isnan(values[5]));
+}
+
+TEST(Draw, OrdersAllRows) {
+  Draw draw(3);
+  std::vector<std::uint32_t> place = draw.order(300);
+  EXPECT_FALSE(std::ranges::is_sorted(place));
+  std::ranges::sort(place);
+  for (std::uint32_t i = 0; i < 300; ++i) EXPECT_EQ(place[i], i);
 }
 
 TEST(SampleValues, WhatTheSceneLanguageGivesMustBeTaken) {
