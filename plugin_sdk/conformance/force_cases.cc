@@ -111,7 +111,32 @@ std::vector<TypeDeclaration> force_types_of(Subject& subject, std::string* refus
                        [&](const TypeDeclaration& type, Draw* draw) { return probe(subject, type, draw); });
 }
 
-// Forces of all types, two of each, on some bodies.
+// Draws values of every property of a force, where these are taken.
+void vary_force(Subject& subject, const TypeDeclaration& type, std::size_t force, Draw* draw, Forces* forces) {
+  Forces alone = *forces;
+  alone.applications.clear();
+  for (std::size_t i = 0; i < forces->applications.size(); i += 2)
+    if (forces->applications[i] == force) alone.apply(force, forces->applications[i + 1]);
+  vary(type.properties, draw, &alone.parameters[force], [&] { return subject.ask(kWrenches, alone.request()); });
+  forces->parameters[force] = alone.parameters[force];
+}
+
+// Calls judge(name, forces) with a force of each type on a body, by its defaults and with values of every property.
+template <typename Judge>
+void for_each_force(Subject& subject, Draw* draw, Judge&& judge) {
+  for (const TypeDeclaration& type : force_types_of(subject)) {
+    for (const bool varies : {false, true}) {
+      Forces forces;
+      forces.bodies = {random_body(draw)};
+      forces.add_force(type_id(type.name), sample_values(type.properties, draw));
+      forces.apply(0, 0);
+      if (varies) vary_force(subject, type, 0, draw, &forces);
+      judge(varies ? shown(type, forces.parameters[0]) : type.name, forces);
+    }
+  }
+}
+
+// Forces of all types on some bodies: one by its defaults, and one with values of every property.
 Forces mixture(Subject& subject, std::size_t bodies, Draw* draw) {
   const std::vector<TypeDeclaration> types = force_types_of(subject);
   Forces forces;
@@ -125,6 +150,7 @@ Forces mixture(Subject& subject, std::size_t bodies, Draw* draw) {
       forces.add_force(type_id(type.name), sample_values(type.properties, draw));
   for (std::size_t force = 0; force < forces.types.size(); ++force) forces.apply(force, force % bodies);
   for (std::size_t body = 0; body < bodies && !types.empty(); ++body) forces.apply(body % forces.types.size(), body);
+  for (std::size_t i = 0; i < types.size(); ++i) vary_force(subject, types[i], types.size() + i, draw, &forces);
   return forces;
 }
 
@@ -206,14 +232,10 @@ void judge_force_permutation(Subject& subject) {
 // A wrench that is said to be constant is taken once and for ever.
 void judge_constant(Subject& subject) {
   Draw draw(33);
-  for (const TypeDeclaration& type : force_types_of(subject)) {
-    Forces forces;
-    forces.bodies = {random_body(&draw)};
-    forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
-    forces.apply(0, 0);
-    Inquiry inquiry(subject, "a force " + type.name + " in two states and at two times");
+  for_each_force(subject, &draw, [&](const std::string& force, Forces& forces) {
+    Inquiry inquiry(subject, "a force " + force + " in two states and at two times");
     const ForceAnswer first = ask(&inquiry, forces)[0];
-    if ((first.flags & kConstantWrench) == 0) continue;
+    if ((first.flags & kConstantWrench) == 0) return;
     const Vector3 start = forces.bodies[0].pose.position;
     forces.bodies[0].pose = draw.pose(5.0);
     forces.bodies[0].twist = {draw.vector(9.0), draw.vector(9.0)};
@@ -221,24 +243,20 @@ void judge_constant(Subject& subject) {
     const ForceAnswer then = ask(&inquiry, forces)[0];
     const double tolerance = 1e-12 * (1.0 + first.wrench.force.norm() + first.wrench.torque.norm());
     expect_wrench(inquiry, ", said to be constant,", then.wrench, first.wrench, tolerance);
-    if ((first.flags & kHasPotential) == 0) continue;
+    if ((first.flags & kHasPotential) == 0) return;
     const double right = first.potential - first.wrench.force.dot(forces.bodies[0].pose.position - start);
     inquiry.expect_near("potential", then.potential, right, 1e-12 * (1.0 + std::fabs(right)));
-  }
+  });
 }
 
 // f = -dU/dx and torque = -dU/dturn, by central differences, at rest.
 void judge_potential(Subject& subject) {
   Draw draw(34);
-  for (const TypeDeclaration& type : force_types_of(subject)) {
-    Forces forces;
-    forces.bodies = {random_body(&draw)};
+  for_each_force(subject, &draw, [&](const std::string& force, Forces& forces) {
     forces.bodies[0].twist = {};
-    forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
-    forces.apply(0, 0);
-    Inquiry inquiry(subject, "a force " + type.name + " on a body at rest");
+    Inquiry inquiry(subject, "a force " + force + " on a body at rest");
     const ForceAnswer here = ask(&inquiry, forces)[0];
-    if ((here.flags & kHasPotential) == 0) continue;
+    if ((here.flags & kHasPotential) == 0) return;
     constexpr double kStep = 1e-5;
     const PushedBody start = forces.bodies[0];
     const auto potential_at = [&](const Vector3& shift, const Vector3& turn) {
@@ -259,7 +277,7 @@ void judge_potential(Subject& subject) {
       inquiry.expect_near("torque about " + name + " (against the slope of its potential)", here.wrench.torque[axis],
                           -turned, tolerance);
     }
-  }
+  });
 }
 
 void judge_force_hostile(Subject& subject) {
