@@ -27,11 +27,14 @@ constexpr std::uint32_t kForeignBody = 1000000;
 
 std::string shown_pair(const Solids& world) { return world.solids[0].type + " and " + world.solids[1].type; }
 
+Answer probe(Subject& subject, const Solid& solid, Draw* draw) {
+  return subject.ask(kManifolds, Solids::two(solid, {}, solid, draw->pose(1.0)).request());
+}
+
 std::vector<TypeDeclaration> shape_types_of(Subject& subject, std::string* refusal = nullptr) {
   constexpr const char* kKnown[] = {"Sphere", "Box", "Cylinder", "Halfspace", "Capsule", "Cone"};
   return askable_types(subject.declaration(), kKnown, refusal, [&](const TypeDeclaration& type, Draw* draw) {
-    const Solid solid = random_solid(subject.declaration(), type, draw);
-    return subject.ask(kManifolds, Solids::two(solid, {}, solid, draw->pose(1.0)).request());
+    return probe(subject, random_solid(subject.declaration(), type, draw), draw);
   });
 }
 
@@ -205,7 +208,8 @@ void judge_velocity(Subject& subject) {
   });
 }
 
-// Bodies of all types in a lattice, each with its neighbours.
+// Bodies of all types in a lattice, each with its neighbours; the second ones with values of every property, unless these
+// are known.
 Solids crowd(Subject& subject, std::uint32_t count, Draw* draw) {
   const std::vector<TypeDeclaration> types = shape_types_of(subject);
   Solids world;
@@ -214,7 +218,11 @@ Solids crowd(Subject& subject, std::uint32_t count, Draw* draw) {
   std::uint32_t edge = 1;
   while (edge * edge * edge < count) ++edge;
   for (std::uint32_t i = 0; i < count; ++i) {
-    world.solids.push_back(random_solid(subject.declaration(), types[i % types.size()], draw));
+    const TypeDeclaration& type = types[i % types.size()];
+    Solid solid = random_solid(subject.declaration(), type, draw);
+    if (!solid.is_known() && i / types.size() == 1)
+      vary(type.properties, draw, &solid.parameters, [&] { return probe(subject, solid, draw); });
+    world.solids.push_back(solid);
     const std::uint32_t row = i / edge % edge, layer = i / (edge * edge);
     const Vector3 place(i % edge, row, layer);
     world.bodies.push_back({.solid = i,

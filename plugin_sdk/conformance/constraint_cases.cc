@@ -36,6 +36,19 @@ double largest_error(const std::vector<DescribedJoint>& described) {
 
 // ---- every type
 
+// Calls judge(name, world) with a joint of each type between these, by its defaults and with values of every property.
+template <typename Judge>
+void for_each_joint(Subject& subject, const Ends& ends, Draw* draw, Judge&& judge) {
+  for (const TypeDeclaration& type : joint_types_of(subject)) {
+    for (const bool varies : {false, true}) {
+      Joints world = joined(type, draw);
+      world.joints[0].body1 = ends.first, world.joints[0].body2 = ends.second;
+      if (varies) vary_joint(subject, type, 0, draw, &world);
+      judge(varies ? shown(type, world.joints[0].properties) : type.name, world);
+    }
+  }
+}
+
 void judge_bind(Subject& subject) {
   Draw draw(41);
   for (const TypeDeclaration& type : joint_types_of(subject)) {
@@ -118,12 +131,11 @@ void compare_growth(Joints world, const std::vector<DescribedJoint>& before, Inq
 
 void judge_rows(Subject& subject) {
   Draw draw(42);
-  for (const TypeDeclaration& type : joint_types_of(subject)) {
-    Joints world = joined(type, &draw);
-    Inquiry inquiry(subject, type.name + " where it was bound, and 1e-6 s later");
+  for_each_joint(subject, {0, 1}, &draw, [&](const std::string& name, Joints& world) {
+    Inquiry inquiry(subject, name + " where it was bound, and 1e-6 s later");
     world.bind(&inquiry);
     compare_growth(world, world.describe(&inquiry), &inquiry);
-  }
+  });
 }
 
 // Where a joint lets a body go its points must not be told apart: the rows would push with an arm as long as half the way
@@ -154,9 +166,8 @@ void judge_ways(Subject& subject) {
 // Both bodies moved as one: nothing that a solver sees changes but its direction.
 void judge_constraint_frames(Subject& subject) {
   Draw draw(43);
-  for (const TypeDeclaration& type : joint_types_of(subject)) {
-    Joints world = joined(type, &draw);
-    Inquiry inquiry(subject, type.name + " out of place, and the same in a world that is shifted and turned");
+  for_each_joint(subject, {0, 1}, &draw, [&](const std::string& name, Joints& world) {
+    Inquiry inquiry(subject, name + " out of place, and the same in a world that is shifted and turned");
     world.bind(&inquiry);
     world.bodies[1].pose = displaced(world.bodies[1].pose, draw.vector(0.1), draw.vector(0.1));
     const std::vector<DescribedJoint> plain = world.describe(&inquiry);
@@ -179,21 +190,22 @@ void judge_constraint_frames(Subject& subject) {
       inquiry.expect_near("compliance" + of, b.compliance, a.compliance, kJointRounding);
       inquiry.expect_near("damping" + of, b.damping, a.damping, kJointRounding);
     }
-  }
+  });
 }
 
-// The world is a body at the origin that does not move.
+// The world is a body at the origin that does not move, and no other body.
 void judge_world(Subject& subject) {
   Draw draw(44);
-  for (const TypeDeclaration& type : joint_types_of(subject)) {
-    Joints by_world = joined(type, &draw);
-    by_world.bodies[0] = {};
+  for_each_joint(subject, {kNone, 1}, &draw, [&](const std::string& name, Joints& by_world) {
     Joints by_body = by_world;
-    by_world.joints[0].body1 = kNone;
-    Inquiry inquiry(subject, type.name + " to the world, and to a body at rest at the origin");
+    by_body.bodies.emplace_back();
+    by_body.joints[0].body1 = 2;
+    Inquiry inquiry(subject, name + " to the world, and to a body at rest at the origin");
     by_world.bind(&inquiry), by_body.bind(&inquiry);
-    const Pose moved = displaced(by_world.bodies[1].pose, draw.vector(0.1), draw.vector(0.1));
-    by_world.bodies[1].pose = by_body.bodies[1].pose = moved;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Pose moved = displaced(by_world.bodies[i].pose, draw.vector(0.1), draw.vector(0.1));
+      by_world.bodies[i].pose = by_body.bodies[i].pose = moved;
+    }
     const std::vector<DescribedJoint> a = by_world.describe(&inquiry), b = by_body.describe(&inquiry);
     inquiry.expect(a.size() == b.size(),
                    "has " + std::to_string(a.size()) + " discrepancies instead of " + std::to_string(b.size()));
@@ -203,7 +215,67 @@ void judge_world(Subject& subject) {
       inquiry.expect_near("point2" + of, a[i].discrepancy.point2, b[i].discrepancy.point2, kJointRounding);
       inquiry.expect_near("velocity" + of, a[i].discrepancy.velocity, b[i].discrepancy.velocity, 10 * kJointRounding);
     }
+  });
+}
+
+// Each body joined to the one before it, or on either side to the world, by joints of all types in turn,
+// the second ones with values of every property.
+Joints chain_of(Subject& subject, std::uint32_t count, Draw* draw) {
+  const std::vector<TypeDeclaration> types = joint_types_of(subject);
+  Joints chain;
+  for (std::uint32_t i = 0; i < count && !types.empty(); ++i) {
+    chain.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
+    const TypeDeclaration& type = types[i % types.size()];
+    const std::uint32_t other = i % 10 == 0 ? kNone : i - 1;
+    const bool is_first = i % 20 == 10;
+    chain.joints.push_back({.type = type_id(type.name),
+                            .body1 = is_first ? i : other,
+                            .body2 = is_first ? other : i,
+                            .properties = sample_values(type.properties, draw)});
+    if (i / types.size() == 1) vary_joint(subject, type, i, draw, &chain);
   }
+  return chain;
+}
+
+void expect_same(const Inquiry& inquiry, const Discrepancy& came, const Discrepancy& right) {
+  inquiry.expect_near("point1", came.point1, right.point1, 0.0);
+  inquiry.expect_near("point2", came.point2, right.point2, 0.0);
+  inquiry.expect_near("velocity", came.velocity, right.velocity, 0.0);
+  inquiry.expect(came.modes == right.modes && came.axes.coeffs() == right.axes.coeffs(), "has other modes or axes");
+}
+
+// Of hundreds of joints: the same ones in other rows, between the same bodies in other rows.
+void judge_constraint_permutation(Subject& subject) {
+  Draw draw(50);
+  Joints plain = chain_of(subject, 300, &draw);
+  const std::size_t count = plain.joints.size();
+  const std::vector<std::uint32_t> place = draw.order(count), row = draw.order(count);
+  const auto renamed = [&](std::uint32_t body) { return body == kNone ? kNone : place[body]; };
+  Joints mixed = plain;
+  for (std::size_t i = 0; i < count; ++i) {
+    Joint& joint = mixed.joints[row[i]] = plain.joints[i];
+    joint.body1 = renamed(joint.body1), joint.body2 = renamed(joint.body2);
+    mixed.bodies[place[i]] = plain.bodies[i];
+  }
+  Inquiry inquiry(subject, std::to_string(count) + " joints, and the same in other rows");
+  plain.bind(&inquiry), mixed.bind(&inquiry);
+  for (std::size_t i = 0; i < count; ++i) {
+    JointedBody& body = plain.bodies[i];
+    body.pose = displaced(body.pose, draw.vector(0.1), draw.vector(0.1));
+    mixed.bodies[place[i]] = body;
+  }
+  std::vector<std::vector<Discrepancy>> right(count);
+  for (const DescribedJoint& one : plain.describe(&inquiry)) right[row[one.joint]].push_back(one.discrepancy);
+  std::vector<std::size_t> described(count, 0);
+  for (const DescribedJoint& one : mixed.describe(&inquiry)) {
+    const std::size_t next = described[one.joint]++;
+    inquiry.now_asked("joint " + std::to_string(one.joint) + " of " + std::to_string(count) +
+                      ", and the same in another row");
+    inquiry.expect(next < right[one.joint].size(), "has more discrepancies");
+    expect_same(inquiry, one.discrepancy, right[one.joint][next]);
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    inquiry.expect(described[i] == right[i].size(), "joint " + std::to_string(i) + " has fewer discrepancies");
 }
 
 // Many joints at once, one of them broken: each as if it were alone.
@@ -211,13 +283,15 @@ void judge_constraint_independence(Subject& subject) {
   Draw draw(45);
   Joints all;
   for (int i = 0; i < 5; ++i) all.bodies.push_back({draw.pose(3.0), {draw.vector(2.0), draw.vector(2.0)}});
+  const std::vector<TypeDeclaration> types = joint_types_of(subject);
   for (std::uint32_t copy = 0; copy < 3; ++copy)
-    for (const TypeDeclaration& type : joint_types_of(subject))
+    for (const TypeDeclaration& type : types)
       all.joints.push_back({.type = type_id(type.name),
                             .body1 = copy == 2 ? kNone : copy,
                             .body2 = copy + 2,
                             .properties = sample_values(type.properties, &draw)});
   if (all.joints.empty()) return;
+  for (std::size_t i = 0; i < types.size(); ++i) vary_joint(subject, types[i], types.size() + i, &draw, &all);
   const std::size_t broken = all.joints.size() / 2;
   const std::vector<JointedBody> start = all.bodies;
   std::vector<JointedBody> moved = start;
@@ -240,11 +314,7 @@ void judge_constraint_independence(Subject& subject) {
     alone.bodies = moved;
     for (const DescribedJoint& one : alone.describe(&inquiry)) {
       inquiry.expect(next < together.size() && together[next].joint == j, "has fewer discrepancies among the others");
-      const Discrepancy &a = together[next++].discrepancy, &b = one.discrepancy;
-      inquiry.expect_near("point1", a.point1, b.point1, 0.0);
-      inquiry.expect_near("point2", a.point2, b.point2, 0.0);
-      inquiry.expect_near("velocity", a.velocity, b.velocity, 0.0);
-      inquiry.expect(a.modes == b.modes && a.axes.coeffs() == b.axes.coeffs(), "has other modes or axes");
+      expect_same(inquiry, together[next++].discrepancy, one.discrepancy);
     }
   }
   inquiry.now_asked(std::to_string(all.joints.size()) + " joints, number " + std::to_string(broken) + " broken");
@@ -395,6 +465,8 @@ std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
       make_case("constraint/world", "The world is a body at the origin, at rest.", judge_world),
       make_case("constraint/independence", "Each joint is described for itself; a broken one not at all.",
                 judge_constraint_independence),
+      make_case("constraint/permutation", "The order of bodies and joints changes no bit of a joint.",
+                judge_constraint_permutation),
       make_case("constraint/displacement", "A body moved from its joint is as wrong as it was moved.",
                 judge_displacement),
       make_case("constraint/refusals", "Bodies that do not exist and types that were not declared are refused.",
@@ -413,18 +485,9 @@ std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
 // The discrepancies of joints that the subject itself has bound.
 std::vector<Question> constraint_questions(Subject& subject, Draw* draw) {
   std::vector<Question> questions;
-  const std::vector<TypeDeclaration> types = joint_types_of(subject);
-  if (types.empty()) return questions;
+  if (joint_types_of(subject).empty()) return questions;
   for (const std::uint32_t count : {1U, 12U, 100U}) {
-    Joints chain;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      chain.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
-      const TypeDeclaration& type = types[i % types.size()];
-      chain.joints.push_back({.type = type_id(type.name),
-                              .body1 = i == 0 ? kNone : i - 1,
-                              .body2 = i,
-                              .properties = sample_values(type.properties, draw)});
-    }
+    Joints chain = chain_of(subject, count, draw);
     const std::string joints = std::to_string(count) + " joints";
     questions.push_back({"binding " + joints, stage::Method::kConstraintBind, chain.bind_request(), {}});
     try {

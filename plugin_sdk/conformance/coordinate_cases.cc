@@ -121,16 +121,18 @@ void judge_frames(Subject& subject) {
   });
 }
 
-// Joints of all types, some of them twice.
+// Joints of all types, three of each, the second with values of every property.
 Joints several(Subject& subject, Draw* draw) {
+  const std::vector<TypeDeclaration> types = joint_types_of(subject);
   Joints all;
   for (int i = 0; i < 4; ++i) all.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
   for (std::uint32_t copy = 0; copy < 3; ++copy)
-    for (const TypeDeclaration& type : joint_types_of(subject))
+    for (const TypeDeclaration& type : types)
       all.joints.push_back({.type = type_id(type.name),
                             .body1 = copy == 2 ? kNone : copy,
                             .body2 = copy + 1,
                             .properties = sample_values(type.properties, draw)});
+  for (std::size_t i = 0; i < types.size(); ++i) vary_joint(subject, types[i], types.size() + i, draw, &all);
   return all;
 }
 

@@ -4,6 +4,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <numeric>
+#include <utility>
+#include <vector>
 
 #include "plugin_sdk/math/pose.h"
 #include "plugin_sdk/math/types.h"
@@ -41,6 +44,13 @@ class Draw {
       const Quaternion q(w, x, y, uniform(-1, 1));
       if (q.norm() > 0.1 && q.norm() <= 1.0) return q.normalized();
     }
+  }
+  // The new place of each of `count` rows, all orders alike.
+  std::vector<std::uint32_t> order(std::size_t count) {
+    std::vector<std::uint32_t> place(count);
+    std::iota(place.begin(), place.end(), 0U);
+    for (std::size_t i = count; i > 1; --i) std::swap(place[i - 1], place[below(static_cast<std::uint32_t>(i))]);
+    return place;
   }
   Pose pose(double reach) {
     const Vector3 position = vector(reach);

@@ -23,6 +23,7 @@ struct PushedBody {
   Pose geometry = {};
   Pose pose = {};
   Twist twist = {};
+  std::uint32_t shape = 0;
 };
 
 // Forces, bodies, and who acts on whom.
@@ -60,9 +61,9 @@ class Forces {
       append(&columns.f64("orientation"), body.pose.orientation);
       append(&columns.f64("linear_velocity"), body.twist.linear);
       append(&columns.f64("angular_velocity"), body.twist.angular);
-      columns.u32("body_shape").push_back(static_cast<std::uint32_t>(columns.u32("body_shape").size() % 2));
+      columns.u32("body_shape").push_back(body.shape);
     }
-    // a ball and a box, in turn
+    // a ball and a box
     columns.u64("shape_type") = {type_id("Sphere"), type_id("Box")};
     columns.u32("shape_parameter_begin") = {0, 1, 4};
     columns.f64("shape_parameter") = {0.5, 0.3, 0.4, 0.5};
@@ -110,17 +111,46 @@ std::vector<TypeDeclaration> force_types_of(Subject& subject, std::string* refus
                        [&](const TypeDeclaration& type, Draw* draw) { return probe(subject, type, draw); });
 }
 
-// Forces of all types, two of each, on some bodies.
+// Draws values of every property of a force, where these are taken.
+void vary_force(Subject& subject, const TypeDeclaration& type, std::size_t force, Draw* draw, Forces* forces) {
+  Forces alone = *forces;
+  alone.applications.clear();
+  for (std::size_t i = 0; i < forces->applications.size(); i += 2)
+    if (forces->applications[i] == force) alone.apply(force, forces->applications[i + 1]);
+  vary(type.properties, draw, &alone.parameters[force], [&] { return subject.ask(kWrenches, alone.request()); });
+  forces->parameters[force] = alone.parameters[force];
+}
+
+// Calls judge(name, forces) with a force of each type on a body, by its defaults and with values of every property.
+template <typename Judge>
+void for_each_force(Subject& subject, Draw* draw, Judge&& judge) {
+  for (const TypeDeclaration& type : force_types_of(subject)) {
+    for (const bool varies : {false, true}) {
+      Forces forces;
+      forces.bodies = {random_body(draw)};
+      forces.add_force(type_id(type.name), sample_values(type.properties, draw));
+      forces.apply(0, 0);
+      if (varies) vary_force(subject, type, 0, draw, &forces);
+      judge(varies ? shown(type, forces.parameters[0]) : type.name, forces);
+    }
+  }
+}
+
+// Forces of all types on some bodies: one by its defaults, and one with values of every property.
 Forces mixture(Subject& subject, std::size_t bodies, Draw* draw) {
   const std::vector<TypeDeclaration> types = force_types_of(subject);
   Forces forces;
   forces.time = 0.4;
-  for (std::size_t i = 0; i < bodies; ++i) forces.bodies.push_back(random_body(draw));
+  for (std::uint32_t i = 0; i < bodies; ++i) {
+    forces.bodies.push_back(random_body(draw));
+    forces.bodies.back().shape = i % 2;
+  }
   for (int copy = 0; copy < 2; ++copy)
     for (const TypeDeclaration& type : types)
       forces.add_force(type_id(type.name), sample_values(type.properties, draw));
   for (std::size_t force = 0; force < forces.types.size(); ++force) forces.apply(force, force % bodies);
   for (std::size_t body = 0; body < bodies && !types.empty(); ++body) forces.apply(body % forces.types.size(), body);
+  for (std::size_t i = 0; i < types.size(); ++i) vary_force(subject, types[i], types.size() + i, draw, &forces);
   return forces;
 }
 
@@ -169,17 +199,43 @@ void judge_force_independence(Subject& subject) {
   }
 }
 
+// Of hundreds of bodies and applications: the same ones in other rows.
+void judge_force_permutation(Subject& subject) {
+  Draw draw(38);
+  const std::size_t bodies = 300;
+  const Forces plain = mixture(subject, bodies, &draw);
+  const std::size_t count = plain.applications.size() / 2;
+  const std::vector<std::uint32_t> place = draw.order(bodies), row = draw.order(count);
+  Forces mixed = plain;
+  for (std::size_t i = 0; i < bodies; ++i) mixed.bodies[place[i]] = plain.bodies[i];
+  for (std::size_t i = 0; i < count; ++i) {
+    mixed.applications[2 * row[i]] = plain.applications[2 * i];
+    mixed.applications[2 * row[i] + 1] = place[plain.applications[2 * i + 1]];
+  }
+  for (std::size_t force = 0; force < plain.types.size(); ++force)
+    for (const TypeDeclaration& type : subject.declaration().types)
+      if (type_id(type.name) == plain.types[force]) rename_bodies(type.properties, place, &mixed.parameters[force]);
+  Inquiry inquiry(subject, std::to_string(count) + " applications to 300 bodies, and the same in other rows");
+  const std::vector<ForceAnswer> a = ask(&inquiry, plain), b = ask(&inquiry, mixed);
+  for (std::size_t i = 0; i < count; ++i) {
+    const ForceAnswer &one = a[i], &other = b[row[i]];
+    const std::string of = " of application " + std::to_string(i) + " in another row";
+    // a plugin may sum over all bodies
+    const auto tolerance = [](const Wrench& w) { return 1e-11 * (1.0 + w.force.norm() + w.torque.norm()); };
+    expect_wrench(inquiry, of, other.wrench, one.wrench, tolerance(one.wrench));
+    expect_wrench(inquiry, " impulse" + of, other.impulse, one.impulse, tolerance(one.impulse));
+    inquiry.expect_near("potential" + of, other.potential, one.potential, 1e-11 * (1.0 + std::fabs(one.potential)));
+    inquiry.expect(other.flags == one.flags, "flags" + of + " are others");
+  }
+}
+
 // A wrench that is said to be constant is taken once and for ever.
 void judge_constant(Subject& subject) {
   Draw draw(33);
-  for (const TypeDeclaration& type : force_types_of(subject)) {
-    Forces forces;
-    forces.bodies = {random_body(&draw)};
-    forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
-    forces.apply(0, 0);
-    Inquiry inquiry(subject, "a force " + type.name + " in two states and at two times");
+  for_each_force(subject, &draw, [&](const std::string& force, Forces& forces) {
+    Inquiry inquiry(subject, "a force " + force + " in two states and at two times");
     const ForceAnswer first = ask(&inquiry, forces)[0];
-    if ((first.flags & kConstantWrench) == 0) continue;
+    if ((first.flags & kConstantWrench) == 0) return;
     const Vector3 start = forces.bodies[0].pose.position;
     forces.bodies[0].pose = draw.pose(5.0);
     forces.bodies[0].twist = {draw.vector(9.0), draw.vector(9.0)};
@@ -187,24 +243,20 @@ void judge_constant(Subject& subject) {
     const ForceAnswer then = ask(&inquiry, forces)[0];
     const double tolerance = 1e-12 * (1.0 + first.wrench.force.norm() + first.wrench.torque.norm());
     expect_wrench(inquiry, ", said to be constant,", then.wrench, first.wrench, tolerance);
-    if ((first.flags & kHasPotential) == 0) continue;
+    if ((first.flags & kHasPotential) == 0) return;
     const double right = first.potential - first.wrench.force.dot(forces.bodies[0].pose.position - start);
     inquiry.expect_near("potential", then.potential, right, 1e-12 * (1.0 + std::fabs(right)));
-  }
+  });
 }
 
 // f = -dU/dx and torque = -dU/dturn, by central differences, at rest.
 void judge_potential(Subject& subject) {
   Draw draw(34);
-  for (const TypeDeclaration& type : force_types_of(subject)) {
-    Forces forces;
-    forces.bodies = {random_body(&draw)};
+  for_each_force(subject, &draw, [&](const std::string& force, Forces& forces) {
     forces.bodies[0].twist = {};
-    forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
-    forces.apply(0, 0);
-    Inquiry inquiry(subject, "a force " + type.name + " on a body at rest");
+    Inquiry inquiry(subject, "a force " + force + " on a body at rest");
     const ForceAnswer here = ask(&inquiry, forces)[0];
-    if ((here.flags & kHasPotential) == 0) continue;
+    if ((here.flags & kHasPotential) == 0) return;
     constexpr double kStep = 1e-5;
     const PushedBody start = forces.bodies[0];
     const auto potential_at = [&](const Vector3& shift, const Vector3& turn) {
@@ -225,7 +277,7 @@ void judge_potential(Subject& subject) {
       inquiry.expect_near("torque about " + name + " (against the slope of its potential)", here.wrench.torque[axis],
                           -turned, tolerance);
     }
-  }
+  });
 }
 
 void judge_force_hostile(Subject& subject) {
@@ -233,6 +285,7 @@ void judge_force_hostile(Subject& subject) {
   for (const TypeDeclaration& type : force_types_of(subject)) {
     Forces forces;
     forces.bodies = {random_body(&draw), random_body(&draw)};
+    forces.bodies[1].shape = 1;
     forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
     forces.apply(0, 0);
     forces.apply(0, 1);
@@ -442,6 +495,8 @@ std::vector<Case> force_cases(const PluginDeclaration& declaration) {
       make_case("force/nothing", "Without an application there is no row.", judge_force_nothing),
       make_case("force/independence", "Each application is answered for itself, in any order, bit for bit.",
                 judge_force_independence),
+      make_case("force/permutation", "The order of bodies and applications changes no wrench.",
+                judge_force_permutation),
       make_case("force/constant", "A wrench said to be constant is the same in every state.", judge_constant),
       make_case("force/potential", "Force and torque are the slope of the potential.", judge_potential),
       make_case("force/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <numeric>
 
 #include "plugin_sdk/conformance/free_bodies.h"
 #include "plugin_sdk/conformance/hostile_numbers.h"
@@ -43,6 +42,14 @@ FreeBodies random_bodies(std::size_t count, Draw* draw) {
     free.bodies.push_back(body);
   }
   return free;
+}
+
+// What answers the derivative: 3 N/m between each body and the origin.
+DerivativeAnswer pull_of_springs(const stage::IntegratorDerivativeRequest& question) {
+  std::vector<double> wrenches(2 * question.position().size(), 0.0);
+  for (std::size_t i = 0; i < question.position().size(); ++i)
+    wrenches[6 * (i / 3) + i % 3] = -3.0 * question.position()[i];
+  return wrenches;
 }
 
 std::string of_moving_body(const char* what, std::size_t body) {
@@ -163,6 +170,26 @@ void judge_constant_force(Subject& subject) {
     inquiry.expect_near("position", came.pose.position, parabola,
                         10.0 * kRounding + (order < 2.0 ? 0.5 * h * h * a.norm() : 0.0));
   }
+}
+
+// A force that stays acts as an impulse of each step: what it adds to the velocity moves the pose by the share theta.
+void judge_theta(Subject& subject) {
+  constexpr double h = 0.1;
+  FreeBodies free;
+  free.time_step = h;
+  free.bodies = {FreeBody{.mass = 2.0, .wrench = {.force = Vector3(2, -4, 6)}}};
+  free.bodies[0].state.twist.linear = Vector3(0, 3, 1);
+  Inquiry inquiry(subject, "2 kg under (2, -4, 6) N, v = (0, 3, 1), h = 0.1, in its fourth step");
+  // a method with history may start by another
+  free.steps(&inquiry, 3);
+  const BodyState before = free.bodies[0].state;
+  free.step(&inquiry);
+  const BodyState& after = free.bodies[0].state;
+  const Vector3 change = after.twist.linear - before.twist.linear;
+  const Vector3 by_change = after.pose.position - before.pose.position - h * before.twist.linear;
+  const double allowed = (10.0 * kRounding + accuracy_of(subject.declaration())) / (h * change.norm());
+  inquiry.expect_near("declared theta (against (x' - x - h v) / (h (v' - v)))", subject.declaration().theta,
+                      by_change.dot(change) / (h * change.squaredNorm()), allowed);
 }
 
 void judge_constant_torque(Subject& subject) {
@@ -339,23 +366,27 @@ void judge_unit(Subject& subject) {
 
 void judge_integrator_permutation(Subject& subject) {
   Draw draw(26);
-  const std::size_t count = 13;
-  const FreeBodies plain = random_bodies(count, &draw);
+  // enough to show what ends at some row
+  const std::size_t count = 300;
+  FreeBodies plain = random_bodies(count, &draw);
   FreeBodies mixed = plain;
-  std::vector<std::size_t> place(count);
-  std::iota(place.begin(), place.end(), std::size_t{0});
-  for (std::size_t i = count - 1; i > 0; --i) std::swap(place[i], place[draw.below(static_cast<std::uint32_t>(i + 1))]);
+  const std::vector<std::uint32_t> place = draw.order(count);
   for (std::size_t i = 0; i < count; ++i) mixed.bodies[place[i]] = plain.bodies[i];
-  Inquiry inquiry(subject, "13 random bodies in two orders");
-  const MessageColumns a = plain.ask(&inquiry), b = mixed.ask(&inquiry);
-  for (std::size_t i = 0; i < count; ++i) {
-    const BodyState one = FreeBodies::state_in(a, i), other = FreeBodies::state_in(b, place[i]);
-    inquiry.expect_near("linear velocity of a body in another row", other.twist.linear, one.twist.linear, 0.0);
-    inquiry.expect_near("angular velocity of a body in another row", other.twist.angular, one.twist.angular, 0.0);
-    inquiry.expect_near("position of a body in another row", other.pose.position, one.pose.position, 0.0);
-    inquiry.expect(other.pose.orientation.coeffs() == one.pose.orientation.coeffs(),
-                   "orientation of a body in another row is " + shown(other.pose.orientation) + ", should be " +
-                       shown(one.pose.orientation) + " bit for bit");
+  for (const bool on_springs : {false, true}) {
+    if (on_springs) plain.derivative = mixed.derivative = pull_of_springs;
+    Inquiry inquiry(subject, on_springs ? "300 bodies on springs in two orders" : "300 random bodies in two orders");
+    // implicit and adaptive methods take all bodies together
+    const double tolerance = on_springs ? 1e-11 + accuracy_of(subject.declaration()) : 0.0;
+    const MessageColumns a = plain.ask(&inquiry), b = mixed.ask(&inquiry);
+    for (std::size_t i = 0; i < count; ++i) {
+      const BodyState one = FreeBodies::state_in(a, i), other = FreeBodies::state_in(b, place[i]);
+      inquiry.expect_near("linear velocity in another row", other.twist.linear, one.twist.linear, tolerance);
+      inquiry.expect_near("angular velocity in another row", other.twist.angular, one.twist.angular, tolerance);
+      inquiry.expect_near("position in another row", other.pose.position, one.pose.position, tolerance);
+      inquiry.expect(on_springs || other.pose.orientation.coeffs() == one.pose.orientation.coeffs(),
+                     "orientation in another row is " + shown(other.pose.orientation) + ", should be " +
+                         shown(one.pose.orientation) + " bit for bit");
+    }
   }
 }
 
@@ -531,6 +562,7 @@ std::vector<Case> integrator_cases(const PluginDeclaration&) {
                 judge_kinematic),
       make_case("integrator/constant-force", "A constant force gives the velocity exactly, the parabola to the order.",
                 judge_constant_force),
+      make_case("integrator/theta", "What a force adds to velocities moves poses by the declared theta.", judge_theta),
       make_case("integrator/constant-torque", "A torque about a principal axis gives the angular velocity tau h / I.",
                 judge_constant_torque),
       make_case("integrator/damping", "Damping c leaves exp(-c h) of both velocities.", judge_damping),
@@ -559,12 +591,7 @@ std::vector<Question> integrator_questions(Draw* draw) {
     FreeBodies free = random_bodies(count, draw);
     const std::string bodies = std::to_string(count) + " bodies";
     questions.push_back({bodies + " under constant wrenches", kIntegrate, free.request(), free.answers()});
-    free.derivative = [](const stage::IntegratorDerivativeRequest& question) {
-      std::vector<double> wrenches(2 * question.position().size(), 0.0);
-      for (std::size_t i = 0; i < question.position().size(); ++i)
-        wrenches[6 * (i / 3) + i % 3] = -3.0 * question.position()[i];
-      return wrenches;
-    };
+    free.derivative = pull_of_springs;
     questions.push_back({bodies + " on springs", kIntegrate, free.request(), free.answers()});
   }
   return questions;

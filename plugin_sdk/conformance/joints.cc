@@ -44,6 +44,15 @@ void Joints::bind(Inquiry* inquiry) {
   check_bound(*inquiry, bound_begin_, bound_.size());
 }
 
+Answer Joints::probe(Subject& subject) const {
+  Answer answer = subject.ask(stage::Method::kConstraintBind, bind_request());
+  if (!answer.ok()) return answer;
+  Joints bound = *this;
+  bound.bound_begin_ = answer.columns.u32("bound_begin");
+  bound.bound_ = answer.columns.f64("bound");
+  return subject.ask(stage::Method::kConstraintDiscrepancies, bound.describe_request());
+}
+
 MessageColumns Joints::describe_request() const {
   MessageColumns request = empty_request(stage::Method::kConstraintDiscrepancies);
   request.f64("time_step") = {0.01};
@@ -116,6 +125,14 @@ std::vector<TypeDeclaration> joint_types_of(Subject& subject, std::string* refus
   return askable_types(subject.declaration(), kKnown, refusal, [&](const TypeDeclaration& type, Draw* draw) {
     return subject.ask(stage::Method::kConstraintBind, joined(type, draw).bind_request());
   });
+}
+
+void vary_joint(Subject& subject, const TypeDeclaration& type, std::size_t joint, Draw* draw, Joints* world) {
+  Joints alone;
+  alone.bodies = world->bodies;
+  alone.joints = {world->joints[joint]};
+  vary(type.properties, draw, &alone.joints[0].properties, [&] { return alone.probe(subject); });
+  world->joints[joint] = alone.joints[0];
 }
 
 double error_of(const Discrepancy& discrepancy) {

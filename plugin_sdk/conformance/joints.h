@@ -37,6 +37,8 @@ class Joints {
   MessageColumns bind_request() const;
   // Binds at the present poses.
   void bind(Inquiry* inquiry);
+  // What the subject says of joints that are bound and described at once.
+  Answer probe(Subject& subject) const;
   MessageColumns describe_request() const;
   // The discrepancies in the present state, checked for what every discrepancy must be.
   std::vector<DescribedJoint> describe(Inquiry* inquiry) const;
@@ -56,6 +58,9 @@ class Joints {
 Joints joined(const TypeDeclaration& type, Draw* draw);
 // Types whose joints can be bound as sample_values() has them.
 std::vector<TypeDeclaration> joint_types_of(Subject& subject, std::string* refusal = nullptr);
+
+// Draws values of every property of a joint, where it can be bound and described with these.
+void vary_joint(Subject& subject, const TypeDeclaration& type, std::size_t joint, Draw* draw, Joints* world);
 
 // Error x2 - x1 of a discrepancy as joint_error() measures it.
 double error_of(const Discrepancy& discrepancy);

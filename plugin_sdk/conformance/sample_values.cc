@@ -34,7 +34,9 @@ double argument_within(const Property& p, int row) {
   return low + (high - low) * (row + 1.0) / (kTableRows + 1.0);
 }
 
-void append_drawn(const Property& p, const Matrix3& axes, int* next_axis, Draw* draw, std::vector<double>* out) {
+// Flags and choices are the first of theirs, unless `varies`.
+void append_drawn(const Property& p, bool varies, const Matrix3& axes, int* next_axis, Draw* draw,
+                  std::vector<double>* out) {
   switch (p.kind) {
     case PropertyKind::kNumber:
       out->push_back(number_within(p, draw));
@@ -43,7 +45,11 @@ void append_drawn(const Property& p, const Matrix3& axes, int* next_axis, Draw* 
       out->push_back(std::ceil(number_within(p, draw)));
       break;
     case PropertyKind::kFlag:
+      out->push_back(varies ? draw->below(2) : 0.0);
+      break;
     case PropertyKind::kChoice:
+      out->push_back(varies ? draw->below(static_cast<std::uint32_t>(p.choices.size())) : 0.0);
+      break;
     case PropertyKind::kBody:
       out->push_back(0.0);
       break;
@@ -67,17 +73,29 @@ void append_drawn(const Property& p, const Matrix3& axes, int* next_axis, Draw* 
   }
 }
 
-}  // namespace
+bool is_refusal(const Answer& answer) { return answer.fault.empty() && answer.status == GRAVITAS_REFUSED; }
 
-std::vector<double> sample_values(const std::vector<Property>& properties, Draw* draw) {
+// Of a property whose values begin there.
+std::size_t size_at(const Property& p, const double* values) {
+  return p.kind == PropertyKind::kTable ? 1 + static_cast<std::size_t>(*values) * p.columns : p.flat_size();
+}
+
+// True if sample_values() draws nothing for it.
+bool has_choice(const Property& p) {
+  return p.kind == PropertyKind::kFlag || p.kind == PropertyKind::kChoice ||
+         (!p.is_required && p.kind != PropertyKind::kBody);
+}
+
+// Each property that need not be given is, with a probability of `share`.
+std::vector<double> values_of(const std::vector<Property>& properties, double share, Draw* draw) {
   std::vector<double> numbers;
   const Matrix3 axes = to_rotation_matrix(draw->rotation());
   int next_axis = 0;
   for (const Property& p : properties) {
-    if (!p.default_numbers.empty()) {
+    if (p.is_required || (share > 0.0 && has_choice(p) && draw->uniform(0.0, 1.0) < share)) {
+      append_drawn(p, share > 0.0, axes, &next_axis, draw, &numbers);
+    } else if (!p.default_numbers.empty()) {
       numbers.insert(numbers.end(), p.default_numbers.begin(), p.default_numbers.end());
-    } else if (p.is_required) {
-      append_drawn(p, axes, &next_axis, draw, &numbers);
     } else if (p.kind == PropertyKind::kTable) {
       numbers.push_back(0.0);
     } else {
@@ -85,6 +103,40 @@ std::vector<double> sample_values(const std::vector<Property>& properties, Draw*
     }
   }
   return numbers;
+}
+
+}  // namespace
+
+std::vector<double> sample_values(const std::vector<Property>& properties, Draw* draw) {
+  return values_of(properties, 0.0, draw);
+}
+
+void vary(const std::vector<Property>& properties, Draw* draw, std::vector<double>* values,
+          const std::function<Answer()>& asked) {
+  if (!std::ranges::any_of(properties, has_choice)) return;
+  const std::vector<double> plain = *values;
+  // some exclude each other
+  for (const double share : {1.0, 0.5, 0.5, 0.3, 0.3, 0.3}) {
+    *values = values_of(properties, share, draw);
+    if (!is_refusal(asked())) return;
+  }
+  *values = plain;
+}
+
+std::string shown(const TypeDeclaration& type, const std::vector<double>& values) {
+  std::string given;
+  const double* at = values.data();
+  for (const Property& p : type.properties) {
+    const std::size_t size = size_at(p, at);
+    if (!std::isnan(*at) && !(p.kind == PropertyKind::kTable && *at == 0.0)) {
+      given += (given.empty() ? "" : ", ") + p.name;
+      for (std::size_t k = 0; k < size; ++k)
+        given +=
+            " " + (p.kind == PropertyKind::kChoice ? p.choices[static_cast<std::size_t>(*at)] : number_text(at[k]));
+    }
+    at += size;
+  }
+  return given.empty() ? type.name : type.name + " (" + given + ")";
 }
 
 std::vector<double> with_directions(const std::vector<Property>& properties, const std::vector<double>& values,
@@ -98,9 +150,19 @@ std::vector<double> with_directions(const std::vector<Property>& properties, con
     if (is_direction && std::isnan(numbers[at]))
       for (int k = 0; k < 3; ++k) numbers[at + static_cast<std::size_t>(k)] = axes(k, next_axis % 3);
     if (is_direction) ++next_axis;
-    at += p.kind == PropertyKind::kTable ? 1 + static_cast<std::size_t>(numbers[at]) * p.columns : p.flat_size();
+    at += size_at(p, &numbers[at]);
   }
   return numbers;
+}
+
+void rename_bodies(const std::vector<Property>& properties, std::span<const std::uint32_t> place,
+                   std::vector<double>* values) {
+  std::size_t at = 0;
+  for (const Property& p : properties) {
+    double& first = (*values)[at];
+    at += size_at(p, &first);
+    if (p.kind == PropertyKind::kBody && !std::isnan(first)) first = place[static_cast<std::size_t>(first)];
+  }
 }
 
 std::vector<double> default_settings(const PluginDeclaration& declaration) {
@@ -140,7 +202,7 @@ std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration,
       Draw draw(type_id(type.name));
       for (int i = 0; i < kProbes && !is_refused; ++i) {
         const Answer answer = probe(type, &draw);
-        is_refused = answer.fault.empty() && answer.status == GRAVITAS_REFUSED;
+        is_refused = is_refusal(answer);
         if (is_refused && refusal != nullptr) *refusal = type.name + ": " + answer.text;
       }
     }

@@ -20,9 +20,22 @@ namespace gravitas::conformance {
 // tables have eight rows whose first column ascends.
 std::vector<double> sample_values(const std::vector<Property>& properties, Draw* draw);
 
+// Draws values of every property in place of such values, also of those that have a default or may be absent, unless what is
+// asked with these is refused each time. Bodies that may be absent stay so: what a force says of two bodies depends on
+// all that it is applied to.
+void vary(const std::vector<Property>& properties, Draw* draw, std::vector<double>* values,
+          const std::function<Answer()>& asked);
+
+// "Spring (Stiffness 2, Frame Body)": a type with the values that are given, for findings.
+std::string shown(const TypeDeclaration& type, const std::vector<double>& values);
+
 // Such values with the directions that may be absent given, too: orthonormal ones.
 std::vector<double> with_directions(const std::vector<Property>& properties, const std::vector<double>& values,
                                     Draw* draw);
+
+// Numbers of properties that name bodies by their rows, after these have got new places.
+void rename_bodies(const std::vector<Property>& properties, std::span<const std::uint32_t> place,
+                   std::vector<double>* values);
 
 // The settings of a plugin that a scene says nothing about.
 std::vector<double> default_settings(const PluginDeclaration& declaration);

@@ -91,6 +91,8 @@ const Wrong kWrong[] = {
     {"constraint_swapped_points", {"constraint/rows"}, "growth (m/s) of the joint error"},
     {"constraint_backward_stop", {"constraint/rows"}, "growth (m/s) of the joint error"},
     {"constraint_no_force", {"constraint/rows"}, "with a maximum_force of 0"},
+    {"constraint_first_body", {"constraint/world", "constraint/permutation"}, "point1 of discrepancy 0 is"},
+    {"force_first_body", {"force/permutation"}, "force of application 0 in another row is"},
     // the second: its type lacks properties that the scene language gives it
     {"force_wrong_torque", {"force/basic", "force/basic-table"}, "torque is"},
     // with what its refusal says
@@ -101,6 +103,8 @@ const Wrong kWrong[] = {
      {"solver/reactions", "solver/reactions_hanging", "solver/reactions_springs"},
      "relative acceleration of the points"},
     {"integrator_drifts", {"integrator/rotor"}, "change of its angular momentum"},
+    {"integrator_few_bodies", {"integrator/permutation"}, "linear velocity in another row is"},
+    {"integrator_wrong_theta", {"integrator/theta"}, "declared theta (against (x' - x - h v) / (h (v' - v))) is 0"},
 };
 
 INSTANTIATE_TEST_SUITE_P(Tree, WrongPlugin, testing::ValuesIn(kWrong),

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "plugin_sdk/conformance/inquiry.h"
@@ -100,6 +101,77 @@ TEST(SampleValues, TablesKeepTheirBoundsAndAscend) {
     EXPECT_EQ(check_flattened(properties, values), "");
     for (std::size_t row = 1; row < 8; ++row) EXPECT_GT(values[1 + 2 * row], values[1 + 2 * (row - 1)]);
   }
+}
+
+std::vector<Property> optional_properties() {
+  return {Property::number("Share", "1").at_least(0.0).at_most(1.0).required(),
+          Property::vector("Wind", "m/s", "world").defaults_to({0, 0, 0}),
+          Property::choice("Frame", {"World", "Body", "Path"}).defaults_to({0}),
+          Property::table("Curve", 2, "1", "world"),
+          Property::body("Anchor"),
+          Property::number("Length", "m").at_least(0.0)};
+}
+
+TEST(VariedValues, GiveWhatHasADefaultOrMayBeAbsentButBodies) {
+  const std::vector<Property> properties = optional_properties();
+  Draw draw(1);
+  bool has_frame = false;
+  for (int i = 0; i < 50; ++i) {
+    std::vector<double> values = sample_values(properties, &draw);
+    vary(properties, &draw, &values, [] { return Answer{}; });
+    EXPECT_EQ(check_flattened(properties, values), "");
+    ASSERT_EQ(values.size(), 1U + 3U + 1U + 17U + 1U + 1U);
+    EXPECT_NE(values[1], 0.0);
+    EXPECT_EQ(values[5], 8.0);
+    EXPECT_TRUE(std::isnan(values[22]));
+    EXPECT_GT(values[23], 0.0);
+    has_frame = has_frame || values[4] == 2.0;
+  }
+  EXPECT_TRUE(has_frame);
+}
+
+// Some of them may exclude each other, or all be wrong.
+TEST(VariedValues, AreDrawnAgainWhereTheyAreRefusedAndGivenUpInTheEnd) {
+  const std::vector<Property> properties = optional_properties();
+  const Answer refused{.status = GRAVITAS_REFUSED, .text = "no", .fault = {}, .columns = {}};
+  Draw draw(1);
+  std::vector<double> values = sample_values(properties, &draw);
+  const std::vector<double> plain = values;
+  int asked = 0;
+  vary(properties, &draw, &values, [&] { return ++asked < 3 ? refused : Answer{}; });
+  EXPECT_EQ(asked, 3);
+  EXPECT_NE(values[0], plain[0]);
+  values = plain;
+  vary(properties, &draw, &values, [&] { return refused; });
+  EXPECT_EQ(values[0], plain[0]);
+  EXPECT_EQ(values[1], 0.0);
+}
+
+TEST(VariedValues, AreShownByTheirNames) {
+  const TypeDeclaration type{"Sail", "", optional_properties()};
+  const double none = std::nan("");
+  EXPECT_EQ(shown(type, {0.5, 1, 2, 3, 1, 0, none, none}), "Sail (Share 0.5, Wind 1 2 3, Frame Body)");
+  EXPECT_EQ(shown(type, {0.5, 0, 0, 0, 0, 1, 7, 8, none, 2}),
+            "Sail (Share 0.5, Wind 0 0 0, Frame World, Curve 1 7 8, Length 2)");
+  EXPECT_EQ(shown(TypeDeclaration{"Sail", "", {}}, {}), "Sail");
+}
+
+TEST(RenamedBodies, HaveTheirNewRows) {
+  const std::vector<Property> properties = {Property::table("Curve", 2, "1", "world"), Property::body("Anchor"),
+                                            Property::number("Length", "m"), Property::body("Other")};
+  std::vector<double> values = {1.0, 5.0, 6.0, 2.0, 0.5, std::nan("")};
+  const std::uint32_t place[] = {2, 0, 1};
+  rename_bodies(properties, place, &values);
+  EXPECT_EQ(std::vector<double>(values.begin(), values.begin() + 5), (std::vector<double>{1.0, 5.0, 6.0, 1.0, 0.5}));
+  EXPECT_TRUE(std::isnan(values[5]));
+}
+
+TEST(Draw, OrdersAllRows) {
+  Draw draw(3);
+  std::vector<std::uint32_t> place = draw.order(300);
+  EXPECT_FALSE(std::ranges::is_sorted(place));
+  std::ranges::sort(place);
+  for (std::uint32_t i = 0; i < 300; ++i) EXPECT_EQ(place[i], i);
 }
 
 TEST(SampleValues, WhatTheSceneLanguageGivesMustBeTaken) {
