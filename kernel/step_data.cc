@@ -142,15 +142,12 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   discrepancies = DiscrepancyAnswer(arena, rows);
   for (DiscrepancyAnswer* one : {&held_joints, &start_joints}) *one = DiscrepancyAnswer(arena, is_smooth ? rows : 0);
   discrepancy_body = Column<std::uint32_t>(arena, 0, 2 * rows);
-  const auto axis_numbers = [&] { return Column<double>(arena, 0, 3 * rows); };
-  discrepancy_force = axis_numbers(), held_force = axis_numbers(), wanted_along = axis_numbers(),
-  none_along = axis_numbers();
-  discrepancy_warm_impulse = axis_numbers(), discrepancy_warm_correction = axis_numbers();
+  for (Column<double>* column : {&discrepancy_force, &held_force, &wanted_along, &none_along, &discrepancy_warm_impulse,
+                                 &discrepancy_warm_correction, &discrepancy_impulse, &discrepancy_correction})
+    *column = Column<double>(arena, 0, 3 * rows);
 
   solved_linear_velocity = bodies_if(has_reactions, 3), solved_angular_velocity = bodies_if(has_reactions, 3);
-  pose_change = bodies_if(has_reactions, 6);
-  discrepancy_impulse = axis_numbers(), discrepancy_correction = axis_numbers(),
-  contact_correction = contact_numbers(1);
+  pose_change = bodies_if(has_reactions, 6), contact_correction = contact_numbers(1);
   contact_impulse = contact_numbers(3), contact_direction = contact_numbers(3), contact_turning = contact_numbers(3);
   iterations = Column<std::uint32_t>(arena, 1, 0), stop_reason = Column<std::uint32_t>(arena, 1, 0);
   residual = Column<double>(arena, 1, 0);
