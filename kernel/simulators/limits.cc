@@ -75,7 +75,7 @@ void Environment::open_parting_contacts() {
   if (!(accuracy > 0.0) || data_.time_step[0] > std::max(kNextToNothing * step, kBeyond * kNear * accuracy)) return;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     const Vector3 parting =
-        contact_velocity(data_, i, front().position, start_linear_velocity(), start_angular_velocity());
+        contact_velocity(data_, i, data_.trial_position, start_linear_velocity(), start_angular_velocity());
     if (vector_at(data_.contact_normal.span(), i).dot(parting) <= std::max(kSlow * accuracy, kRolling)) continue;
     data_.contact_depth[i] = -data_.margin[0];
     set_vector(data_.contact_warm_impulse.span(), static_cast<std::uint32_t>(i), Vector3::Zero());
