@@ -54,7 +54,7 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
   const bool comes_back = encounter.start_speed > 0.0 && encounter.end_speed < 0.0;
   const double top = comes_back ? encounter.start_speed / -acceleration : 0.0;
   if (encounter.fraction <= 0.0 && (!comes_back || 2.0 * top > shortest_flight))
-    if (const double leaves = leaving_time(encounter, length, near); leaves > 0.0) return {leaves};
+    if (const double leaves = leaving_time(encounter, length, near); leaves > 0.0) return {std::min(leaves, pressed)};
   if (comes_back && top >= time) {
     const bool rests =
         2.0 * top <= shortest_flight || 0.5 * encounter.start_speed * top <= std::max(target_gap, encounter.left_gap);

@@ -26,8 +26,8 @@ void Environment::find_joint_impulses() {
   data_.none_along.resize(3 * joints.mode.size()), std::ranges::fill(data_.none_along.span(), 0.0);
   data_.discrepancy_force.resize(3 * joints.mode.size());
   data_.block_body.resize(0), data_.block.resize(0);
-  const DiscrepancyAnswer& none = data_.start_joints;  // what holds always needs no start
-  none.resize(0);
+  data_.start_joints.resize(0);  // what holds always needs none
+  const DiscrepancyAnswer& none = data_.start_joints;
   const auto request =
       ids(model_.flags, model_.inverse_mass, model_.inertia, model_.inverse_inertia, model_.damping,
           data_.held_position, data_.held_orientation, data_.no_velocity, data_.no_velocity, data_.no_wrench,

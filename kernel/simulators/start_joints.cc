@@ -2,6 +2,7 @@
 // holds in a trial state: limits that were closed there, drives that were at their speed (plugin_sdk/solver/reaction_holdings.cc).
 // Joints alone know how they are: carried back from the trial state, a rope on a drum is off by what it rolled.
 #include <algorithm>
+#include <utility>
 
 #include "kernel/environment.h"
 
@@ -14,8 +15,11 @@ bool Environment::ask_start_joints() {
   const auto are_the_same = [&] { return std::ranges::equal(start.constraint.span(), trial.constraint.span()); };
   if (start.mode.size() > 0 && are_the_same()) return true;
   std::swap(trial, start);
+  // behind a switch, not an ulp before it
+  const double time = std::exchange(data_.time[0], std::clamp(data_.time[0], asked_from_, asked_until_));
   ask_discrepancies(data_.time, front().position, front().orientation, start_linear_velocity(),
                     start_angular_velocity());
+  data_.time[0] = time;
   std::swap(trial, start);
   if (are_the_same()) return true;
   start.resize(0);

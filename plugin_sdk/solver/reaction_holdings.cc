@@ -53,6 +53,7 @@ void ReactionSolver::find_holdings() {
     }
   }
   if (!has_others) return;
+  if (tells_start()) carry_cones();
   go_to_start();
   for (Joint& joint : joints_) {
     if (joint.discrepancy.is_twist()) turn_to_limit(&joint);
@@ -60,7 +61,7 @@ void ReactionSolver::find_holdings() {
     const Matrix3 axes = to_rotation_matrix(d.axes);
     const Arms arms = arms_of(d, axes, joint);
     for (int axis = 0; axis < 3; ++axis) {
-      if (!may_hold(d, axis)) continue;
+      if (!may_hold(d, axis) || holds_always(joint.discrepancy, axis)) continue;
       const Row row = row_of_axis(d, axes, axis, arms, joint);
       Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
       holding = holding_at_start(d, axis, row);
@@ -68,6 +69,16 @@ void ReactionSolver::find_holdings() {
     }
   }
   load_bodies();
+}
+
+// An irregular cone has two rows, and which of them comes first may be another in S_n: what it tells there is another piece. Carried
+// back it is the same, exactly (at_pose()).
+void ReactionSolver::carry_cones() {
+  has_moved_ = true;
+  for (Body& body : bodies_) body.pose = start_of(body);
+  for (Joint& joint : joints_)
+    if (joint.discrepancy.is_swing() && axis_mode(joint.discrepancy.modes, 0) == AxisMode::kLimited)
+      joint.at_start = at_pose(joint);
 }
 
 bool ReactionSolver::is_closed_limit(const Joint& joint, std::size_t axis) {

@@ -141,6 +141,7 @@ class ReactionSolver {
   const Discrepancy& told(const Joint& joint) const { return is_at_start_ ? joint.at_start : joint.discrepancy; }
   // Which axes hold, in S_n (reaction_holdings.cc).
   void find_holdings();
+  void carry_cones();
   // A twist that began at its single limit is told by the turns that lead there.
   void turn_to_limit(Joint* joint);
   // Lets go of limits that open in S_n, and of those that have opened since.

@@ -117,11 +117,17 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
       add_warning(warning);
     }
     // what may fail comes last, as the edit is made: a disk may be full, or who is asked for a potential fail
-    try {
-      recorder_->note_edit(edit);
-      figures_->begin_again(environment_.get());
-    } catch (const std::exception& problem) {
-      fault_ = problem.what();
+    const std::string before = fault_;
+    const auto attempt = [&](auto&& act) {
+      try {
+        act();
+      } catch (const std::exception& problem) {
+        fault_ = problem.what();
+      }
+    };
+    attempt([&] { recorder_->note_edit(edit); });
+    attempt([&] { figures_->begin_again(environment_.get()); });
+    if (fault_ != before) {
       keep_faulted_state();
       made.add_warnings(fault_);
     }

@@ -154,7 +154,8 @@ std::vector<kernel::SwapOrder> swaps_to_come(const Resumption& resumed, std::vec
   const auto is_restored = [&](const kernel::SwapOrder& one) { return has_made(resumed.checkpoint, one); };
   std::erase_if(
       named, [&](const kernel::SwapOrder& one) { return one.step <= resumed.checkpoint.step() || is_restored(one); });
-  std::vector<kernel::SwapOrder> known;
+  std::vector<bool> is_known(named.size(), false);
+  std::vector<kernel::SwapOrder> known;  // by the journal alone
   // false if it is ordered already, or by the command line, too
   const auto order_again = [&](kernel::SwapOrder order) {
     const auto is_it = [&](const kernel::SwapOrder& one) {
@@ -165,16 +166,17 @@ std::vector<kernel::SwapOrder> swaps_to_come(const Resumption& resumed, std::vec
       return is_it(one) && have_same_settings(one.plugin, order.plugin);
     };
     if (std::ranges::any_of(known, is_same) || is_restored(order)) return false;
-    const auto same = std::ranges::find_if(named, is_it);
-    const bool is_named = same != named.end();
-    if (is_named) {
-      if (has_same_properties(same->plugin.declaration, order.plugin.declaration))
-        same->plugin.settings = std::move(order.plugin.settings);
-      order = std::move(*same);
-      named.erase(same);
+    for (std::size_t i = 0; i < named.size(); ++i)
+      if (is_known[i] && is_same(named[i])) return false;
+    for (std::size_t i = 0; i < named.size(); ++i) {
+      if (is_known[i] || !is_it(named[i])) continue;
+      is_known[i] = true;
+      if (has_same_properties(named[i].plugin.declaration, order.plugin.declaration))
+        named[i].plugin.settings = std::move(order.plugin.settings);
+      return false;
     }
     known.push_back(std::move(order));
-    return !is_named;
+    return true;
   };
   for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
     if (!order_again(order_of(decision, catalog)) || decision.why() == "swap") continue;
@@ -183,8 +185,8 @@ std::vector<kernel::SwapOrder> swaps_to_come(const Resumption& resumed, std::vec
                                     decision.step(), decision.slot(), decision.plugin(), decision.why()));
   }
   for (const LiveOrder& one : live) order_again(one.swap);
-  known.insert(known.begin(), named.begin(), named.end());
-  return known;
+  named.insert(named.end(), known.begin(), known.end());
+  return named;
 }
 
 void warn_of_unknown_swaps(std::span<const kernel::SwapOrder> orders, const recorder::v1::Checkpoint& checkpoint,

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <filesystem>
 #include <system_error>
 
@@ -342,8 +343,13 @@ class Run final : private kernel::CommitListener {
     note_edit(*edit, &result_.report);
     attend();
     if (recorder_) recorder_->set_decisions(decisions_);
-    // before all that may fail in the new environment
-    if (recorder_) recorder_->note_edit(*edit);
+    // before all that may fail in the new environment; where its own disk is full, figures are of that all the same
+    std::exception_ptr failure;
+    try {
+      if (recorder_) recorder_->note_edit(*edit);
+    } catch (const std::exception&) {
+      failure = std::current_exception();
+    }
     if (event_source_) event_source_->begin_again(*environment_);
     if (trajectory_) trajectory_->follow(description_);
     if (reactions_) reactions_->begin_again();
@@ -353,6 +359,7 @@ class Run final : private kernel::CommitListener {
          fmt::format("{} before step {}", counted(edit->changes_size(), "change"), edit->step()));
     for (const std::uint32_t body : woken)
       tell({EventKind::kWake, environment_->step_count(), environment_->time(), body}, "");
+    if (failure) std::rethrow_exception(failure);
   }
 
   void attend() {
