@@ -32,7 +32,7 @@ double accelerated_time(const Encounter& encounter, double acceleration, double 
   return std::max(time, speed <= 0.0 ? 2.0 * way / (root - speed) : (speed + root) / -acceleration);
 }
 
-// How long a trial is that presses a touching pair together by no more than it may.
+// How long a trial is that presses a pair that starts closed together by no more than it may.
 double pressed_time(const Encounter& encounter, double acceleration, double length, double shortest_flight) {
   constexpr double kShortest = 1e3;  // shortest flights
   const double speed = encounter.start_speed, most = encounter.most_pressed;

@@ -20,7 +20,11 @@ bool are_locks(const DiscrepancyColumns& joints) {
 }
 
 bool may_let_go(const DiscrepancyColumns& joints) {
+  const auto is_plain = [](AxisMode mode) { return mode == AxisMode::kFree || mode == AxisMode::kLocked; };
   for (std::size_t row = 0; row < joints.size(); ++row) {
+    const std::uint32_t modes = joints.mode[row];
+    // most rows; this is asked with each derivative
+    if (is_plain(axis_mode(modes, 0)) && is_plain(axis_mode(modes, 1)) && is_plain(axis_mode(modes, 2))) continue;
     const Discrepancy d = joints.at(row);
     if (may_hold(d, 0) || may_hold(d, 1) || may_hold(d, 2)) return true;
   }

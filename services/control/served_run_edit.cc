@@ -117,17 +117,17 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
       add_warning(warning);
     }
     // what may fail comes last, as the edit is made: a disk may be full, or who is asked for a potential fail
-    const std::string before = fault_;
+    bool has_failed = false;
     const auto attempt = [&](auto&& act) {
       try {
         act();
       } catch (const std::exception& problem) {
-        fault_ = problem.what();
+        fault_ = problem.what(), has_failed = true;
       }
     };
     attempt([&] { recorder_->note_edit(edit); });
     attempt([&] { figures_->begin_again(environment_.get()); });
-    if (fault_ != before) {
+    if (has_failed) {
       keep_faulted_state();
       made.add_warnings(fault_);
     }
