@@ -89,12 +89,11 @@ class SameBits : public ::testing::TestWithParam<std::string> {};
 TEST_P(SameBits, InProcessAndInWorkersWithOneThreadOrTwoAndAgain) {
   const std::string scene = GetParam();
   const std::optional<std::uint32_t> whole = most_steps(scene);
-  const Hashes reference = hashes_of(scene, kAllDirect, 1, {}, whole);
-  EXPECT_EQ(hashes_of(scene, kAllDirect, 1, {}, whole), reference) << "repeated";
-  EXPECT_EQ(hashes_of(scene, kAllDirect, 2, {}, whole), reference) << "two threads";
+  EXPECT_EQ(hashes_of(scene, kAllDirect, 2, {}, whole), hashes_of(scene, kAllDirect, 1, {}, whole)) << "two threads";
 
   const std::uint32_t steps = steps_in_workers(scene);
   const Hashes start = hashes_of(scene, kAllDirect, 1, {}, steps);
+  EXPECT_EQ(hashes_of(scene, kAllDirect, 1, {}, steps), start) << "repeated";
   EXPECT_EQ(hashes_of(scene, kAllWorkers, 1, {}, steps), start) << "in workers";
   EXPECT_EQ(hashes_of(scene, kAllWorkers, 2, {}, steps), start) << "in workers with two threads";
   EXPECT_EQ(hashes_of(scene, kAllMessages, 1, {}, steps), start) << "in workers by gRPC";
