@@ -243,7 +243,8 @@ void IslandSolver::guess_offset(double share) {
       if (slips(joint, k)) joint.states[k].mode = AxisMode::kFree;
       if (is_spring(joint.states[k])) load_spring(k, &joint);
       if (!is_drive(joint.states[k].mode)) continue;
-      const double impulse = answer_.joint_impulse[3 * joint.row + k];
+      // with reactions S* has what a drive does in the step; what it did in an impact before would press its arm through stops
+      const double impulse = has_reactions() ? 0.0 : answer_.joint_impulse[3 * joint.row + k];
       push_at_trial(joint, joint.directions[k], share * impulse, &offset_);
       if (velocity_law_of(joint, k).is_unbounded_drive()) joint.driven[k] = impulse;
     }

@@ -203,6 +203,34 @@ TEST(StopsOfSmooth, KeepTheEnergyOfWhatTurns) {
               "ReachConeAngle = 0.4 Restitution = 1 }");
 }
 
+// An arm that a drive turns, whatever pulls at it, drags a ball on a rope that bounces until it stays taut. What the drive did in
+// an impact pressed the arm on in the inner step after it, up to where the rope was taut again: by 5e-3 rad.
+TEST(StopsOfSmooth, LeaveAnArmToItsDrive) {
+  constexpr double kSpeed = 4.6, kDuration = 1.0;
+  const std::string joints =
+      "Constraint { Type = \"AngularMotor\" Id = \"Drive\" Body2 = \"Arm\" CustomProperties { BindAxisPoint1 = {0, 0, 0} "
+      "BindAxisPoint2 = {0, 0, 1} AngularSpeed = " +
+      literal(kSpeed) +
+      " } }\nConstraint { Type = \"Distance\" Id = \"Rope\" Body1 = \"Arm\" Body2 = \"Ball\" CustomProperties { BindPoint1 = "
+      "{-0.4, -0.9, 0} BindPoint2 = {0.14, -0.11, 0} MaximumDistance = 1 Restitution = ";
+  const std::string down =
+      "Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } }";
+  const std::string bodies =
+      "Body { Id = \"Arm\" Mass = 2 PrincipalMoments = {0.1, 0.1, 0.1} Forces = {\"Down\"} KineticProperties { "
+      "AngularVelocity = {0, 0, " +
+      literal(kSpeed) +
+      "} } } Body { Id = \"Ball\" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} Forces = {\"Down\"} KineticProperties { "
+      "Position = {0.14, -0.11, 0} } }";
+  for (const double e : {0.0, 0.2, 0.3, 0.4, 0.6}) {
+    SceneRun run(
+        scene(down, bodies, joints + literal(e) + " } }", 1.0 / 60.0, kDuration, "DormandPrince54"));
+    run.to_end();
+    const Quaternion& attitude = run.body("Arm").pose.orientation;
+    const double ahead = 2.0 * std::atan2(attitude.z(), attitude.w()) - kSpeed * kDuration;
+    EXPECT_NEAR(std::remainder(ahead, 4.0 * std::acos(0.0)), 0.0, 1e-5) << e;
+  }
+}
+
 // A rope that stops 1 kg at 1 m/s in a step of 1/60 s bears 60 N in the mean, and is compared with that.
 TEST(StopsOfSmooth, BreakWhatBearsLessThanTheMeanOverTheStep) {
   for (const double bears : {50.0, 70.0}) {
