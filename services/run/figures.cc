@@ -21,6 +21,8 @@ constexpr double kTorn = 0.01;
 constexpr double kOverlap = 0.02;
 // Ways of a step, of what the scene measures: nobody means that.
 constexpr double kRunaway = 1e6;
+// Calls of plugins in a step that take seconds.
+constexpr std::uint64_t kManyCalls = 100'000;
 
 void write_change(const Vector3& initial, const Vector3& final_value, report::v1::VectorChange* change) {
   for (int k = 0; k < 3; ++k) {
@@ -187,11 +189,17 @@ void Figures::look_at(const kernel::InnerStep& inner) {
   contradicts_ = contradicts_ || tells_contradiction(static_cast<StopReason>(inner.data.stop_reason[0]));
 }
 
+Figures::Effort Figures::largest_effort() const {
+  return calls_ > effort_.calls ? Effort{calls_, steps_ + 1} : effort_;
+}
+
 void Figures::follow(kernel::Environment* environment) {
+  effort_ = largest_effort(), calls_ = 0;
   for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
   last_.reset();
   last_ = totals(environment);
-  is_at_start_ = environment->step_count() == 0;
+  steps_ = environment->step_count();
+  is_at_start_ = steps_ == 0;
   if (!initial_) {
     reference_energy_ = (initial_ = last_)->energy();
     measure(environment);
@@ -257,6 +265,12 @@ void Figures::write(report::v1::Report* report) const {
         runaway_->step + (runaway_->is_given ? 1 : 0), scene_size_,
         runaway_->is_given ? "that is the speed which it was given"
                            : "it runs away, as where TimeStep is too long for the forces and the integrator"));
+  if (const Effort most = largest_effort(); most.calls > kManyCalls)
+    report->add_warnings(fmt::format(
+        "step {} {} {} calls of plugins: the scene is stiff for its integrator, impacts follow each other closely, or "
+        "Accuracy is small; where springs, or light bodies between joints, are stiff, an implicit integrator (Radau, "
+        "Rosenbrock) takes long steps",
+        most.step, most.step > steps_ ? "was not ended after" : "took", most.calls));
   for (const Drive& drive : drives_) {
     const auto write_drive = [&](auto* message) {
       message->set_constraint(description_.constraints[drive.constraint].id);

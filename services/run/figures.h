@@ -18,13 +18,15 @@ class Figures {
   // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential); then
   // its energy and momenta are written as NaN.
   void follow(kernel::Environment* environment);
+  // Called for every call of a plugin in a step.
+  void count_call() { ++calls_; }
   // Called for every inner step.
   void look_at(const kernel::InnerStep& inner);
   // The scene was edited: energy is compared with that of now.
   void begin_again(kernel::Environment* environment);
 
-  // Energy, momenta, penetration, joint error, drives; warnings where joints came open, and why, where a body runs away, and where
-  // bodies overlap at the start.
+  // Energy, momenta, penetration, joint error, drives; warnings where joints came open, and why, where a body runs away, where
+  // bodies overlap at the start, and where a step, be it the one that was not ended, takes very many calls.
   void write(report::v1::Report* report) const;
 
   // The extremes so far, into a checkpoint and out of it. To resume: follow() the initial state, resume(), and follow()
@@ -60,6 +62,10 @@ class Figures {
     bool is_given;       // no step has been made with that speed
   };
 
+  struct Effort {
+    std::uint64_t calls = 0, step = 0;
+  };
+
   // Of two bodies at the start.
   struct Overlap {
     std::string one, two;
@@ -69,6 +75,8 @@ class Figures {
 
   Totals totals(kernel::Environment* environment) const;
   void find_overlaps(const kernel::InnerStep& inner);
+  // Of all steps, with the one that goes on.
+  Effort largest_effort() const;
   void find_drives();
   void measure(kernel::Environment* environment);
   double drive_speed(const Drive& drive, const kernel::StateView& state) const;
@@ -85,6 +93,9 @@ class Figures {
   std::optional<Runaway> runaway_;               // the first
   std::optional<std::uint64_t> opening_step_;    // the first in which joints came open by kTorn of it
   std::optional<std::uint64_t> edited_step_;     // the one after the last edit
+  std::uint64_t calls_ = 0;                      // in the step that goes on
+  std::uint64_t steps_ = 0;                      // that were made
+  Effort effort_;                                // the largest of these
   bool is_at_start_ = false;                     // no step has been made
   Overlap overlap_;
 };

@@ -159,8 +159,10 @@ class Run final : private kernel::CommitListener {
   }
 
   kernel::HostStarter starter() {
-    return interruptible(with_fault_desk(options_.starter, &environment_),
-                         [this] { return is_stepping_ && interrupted_(); });
+    return interruptible(with_fault_desk(options_.starter, &environment_), [this] {
+      if (is_stepping_) figures_->count_call();
+      return is_stepping_ && interrupted_();
+    });
   }
 
   // Whatever ended the run: the last commit is kept where a checkpoint is wanted or needed.

@@ -377,11 +377,11 @@ void PrintTo(const Judged& one, std::ostream* out) { *out << one.worker; }
 class PythonWorker : public ::testing::TestWithParam<Judged> {};
 
 // Levels C0, C1 and C4 are of the SDK, which the first two show; a solver in Python takes a hundredth of a second for a call.
-INSTANTIATE_TEST_SUITE_P(
-    Each, PythonWorker,
-    ::testing::Values(Judged{"collision_balls", {""}}, Judged{"force_drag", {""}},
-                      Judged{"solver_islands", {"--level C3", "--level C5", "--case purity/after-others"}}),
-    [](const auto& one) { return std::string(one.param.worker); });
+INSTANTIATE_TEST_SUITE_P(Each, PythonWorker,
+                         ::testing::Values(Judged{"collision_balls", {""}}, Judged{"force_drag", {""}},
+                                           Judged{"solver_islands",
+                                                  {"--level C3", "--level C5", "--case purity/after-others"}}),
+                         [](const auto& one) { return std::string(one.param.worker); });
 
 // With the fewest calls, and with as long as a busy machine takes for them.
 TEST_P(PythonWorker, ConformsSaysTheKit) {

@@ -208,10 +208,12 @@ TEST(StopsOfSmooth, KeepTheEnergyOfWhatTurns) {
 TEST(StopsOfSmooth, LeaveAnArmToItsDrive) {
   constexpr double kSpeed = 4.6, kDuration = 1.0;
   const std::string joints =
-      "Constraint { Type = \"AngularMotor\" Id = \"Drive\" Body2 = \"Arm\" CustomProperties { BindAxisPoint1 = {0, 0, 0} "
+      "Constraint { Type = \"AngularMotor\" Id = \"Drive\" Body2 = \"Arm\" CustomProperties { BindAxisPoint1 = {0, 0, "
+      "0} "
       "BindAxisPoint2 = {0, 0, 1} AngularSpeed = " +
       literal(kSpeed) +
-      " } }\nConstraint { Type = \"Distance\" Id = \"Rope\" Body1 = \"Arm\" Body2 = \"Ball\" CustomProperties { BindPoint1 = "
+      " } }\nConstraint { Type = \"Distance\" Id = \"Rope\" Body1 = \"Arm\" Body2 = \"Ball\" CustomProperties { "
+      "BindPoint1 = "
       "{-0.4, -0.9, 0} BindPoint2 = {0.14, -0.11, 0} MaximumDistance = 1 Restitution = ";
   const std::string down =
       "Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } }";
@@ -222,8 +224,7 @@ TEST(StopsOfSmooth, LeaveAnArmToItsDrive) {
       "} } } Body { Id = \"Ball\" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} Forces = {\"Down\"} KineticProperties { "
       "Position = {0.14, -0.11, 0} } }";
   for (const double e : {0.0, 0.2, 0.3, 0.4, 0.6}) {
-    SceneRun run(
-        scene(down, bodies, joints + literal(e) + " } }", 1.0 / 60.0, kDuration, "DormandPrince54"));
+    SceneRun run(scene(down, bodies, joints + literal(e) + " } }", 1.0 / 60.0, kDuration, "DormandPrince54"));
     run.to_end();
     const Quaternion& attitude = run.body("Arm").pose.orientation;
     const double ahead = 2.0 * std::atan2(attitude.z(), attitude.w()) - kSpeed * kDuration;

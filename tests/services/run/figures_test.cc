@@ -262,6 +262,28 @@ Environment { Space { Bodies {
   EXPECT_THAT(result.report.warnings(), ::testing::Contains(HasSubstr("body \"TheOneThatRunsAway\" went ")));
 }
 
+// A damper that wears off within 1e-7 s, three of which an explicit method takes in an inner step.
+TEST(Figures, TellOfAStepThatTakesManyCalls) {
+  const ScratchFolder folder;
+  RunOptions options;
+  options.scenes = {folder.write("scene", R"(
+Forces { Force { Type = "Spring" Id = "Rod" CustomProperties { Stiffness = 1e7 Damping = 1e7 } } }
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 0.01 } }
+Environment { KineticIntegrator = "DormandPrince54" Space { Bodies {
+  Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { Position = {1, 0, 0} LinearVelocity = {-1, 0, 0} } Forces = {"Rod"} } } } })")};
+  options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
+  const auto warnings = [&](std::uint64_t calls) {
+    return run(
+               options, [&] { return --calls == 0; }, [](const Progress&) {})
+        .report.warnings();
+  };
+  EXPECT_THAT(warnings(150'000), ElementsAre(HasSubstr("step 1 was not ended after ")));
+  EXPECT_THAT(warnings(50'000), ::testing::IsEmpty());
+  EXPECT_THAT(warnings(0), ElementsAre(HasSubstr("step 1 took ")));
+  options.overrides = {"Integrator=Radau"};
+  EXPECT_THAT(warnings(0), ::testing::IsEmpty());
+}
+
 TEST(Figures, OfAnEmptyWorldAreZero) {
   const report::v1::Report report = figures_of("Environment { } Simulator { CustomProperties { Duration = 1 } }", 1);
   EXPECT_EQ(report.energy().initial(), 0.0);
