@@ -182,8 +182,12 @@ struct Flush {
   const Pose& X_FM;  // of the mesh in the frame of the rests
   double length;     // m
 
-  void lay(const PlacedPair& pair, double margin, Manifold* manifold) const {
-    lay_flush(pair, X_FM, rests, length, margin, manifold);
+  void lay(const PlacedPair& pair, const Vector3& front, double margin, Manifold* manifold) const {
+    lay_flush(pair, front, X_FM, rests, length, margin, manifold);
+  }
+  // Would it lay contacts along the front?
+  bool turns(const PlacedPair& pair, const Vector3& front) const {
+    return !flush_normal(pair, front, front, X_FM, rests, length).isZero(0.0);
   }
 };
 
@@ -268,8 +272,8 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
       };
       const bool is_flat = normal.dot(up) > kOnFace;
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold, is_flat ? is_inside : nullptr);
-      flush.lay(pair, margin, &manifold);
     }
+    flush.lay(pair, up, margin, &manifold);
     is_claimed = is_claimed || manifold.count > 0;
     if (manifold.count == 0 && is_before)
       shallowest = std::min(shallowest, std::max(1e-6 * map.radius(), pair.depth_along(up)));
@@ -286,6 +290,11 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
     bool is_least = false;
     return leads_out_inside_flat_face(mesh, t, least.normal) ||
            (choose_normal(pair, side, nullptr, least, &normal, &is_least) && normal.dot(side.normal()) > kOnFace);
+  };
+  const auto lies_flush = [&](std::uint32_t t) {
+    if (flush.rests.are_none()) return false;
+    const TriangleMap triangle(mesh.corners(t), mesh.normal(t));
+    return flush.turns({triangle, map, R, X_MC.position}, side_of(t, triangle).normal());
   };
   const auto collide_triangles = [&] {
     if (is_ball) {
@@ -318,7 +327,7 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
     const Matrix3 R_FM = flush.X_FM.orientation.toRotationMatrix();
     mesh.for_each_in(over.box().widened(margin), [&](std::uint32_t t) {
       Manifold manifold;
-      if (faces.holding(t) != nullptr || !faces.find(t, flush.rests.of_a, R_FM, &manifold)) return;
+      if (faces.holding(t) != nullptr || lies_flush(t) || !faces.find(t, flush.rests.of_a, R_FM, &manifold)) return;
       if (manifold.count > 0) {
         faces.take(true);
         is_claimed = true;
@@ -430,7 +439,7 @@ void collide_mesh_mesh(const Shape& shape_a, const Shape& shape_b, const Pose& X
       if (!choose_normal(pair, side_a, &side_b, least, &normal, &is_least)) return;
       Manifold manifold;
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
-      flush.lay(pair, margin, &manifold);
+      flush.lay(pair, side_a.normal(), margin, &manifold);
       any = any || manifold.count > 0;
       out.add(std::uint64_t{ta} << 32 | tb, manifold);
     });
@@ -491,7 +500,8 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
       collide_mesh_halfspace(*mesh.mesh, X_MO.orientation * Vector3::UnitY(), X_MO.position, margin, collector);
     } else {
       SupportMapBuffer buffer;
-      const PairRests of_mesh_first = is_reversed ? PairRests{rests.of_b, rests.of_a, rests.origin} : rests;
+      PairRests of_mesh_first = rests;
+      if (is_reversed) of_mesh_first.swap();
       const OverMesh over{other, support_map_of(other, &buffer), X_MO, X_MO.orientation.toRotationMatrix()};
       collide_mesh_convex(*mesh.mesh, over, {of_mesh_first, X_WM, flush_length(mesh, other)}, margin, collector);
     }

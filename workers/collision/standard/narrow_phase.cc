@@ -82,7 +82,8 @@ void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB,
   const Shape &first = is_swapped ? b : a, &second = is_swapped ? a : b;
   const Pose &X_W1 = is_swapped ? X_WB : X_WA, &X_W2 = is_swapped ? X_WA : X_WB;
   PairRests own;
-  if (rests != nullptr) own = is_swapped ? PairRests{rests->of_b, rests->of_a, {}} : *rests;
+  if (rests != nullptr) own = *rests;
+  if (is_swapped) own.swap();
   if (is_composite) {
     own.origin = X_W1.position;
     collide_composite(first, {Vector3::Zero(), X_W1.orientation}, second,

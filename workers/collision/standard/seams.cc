@@ -13,6 +13,15 @@ namespace {
 
 constexpr double kFlat = 1e-4;  // sine of an angle wider than that of Rest::is_along()
 
+// What a triangle that is looked at without those around it does not know: the pair whose contacts lay nothing flush, and the side
+// to which contacts lead out of its mesh.
+struct Alone {
+  std::size_t pair = Rest::kSeveral - 1;  // none
+  Vector3 front = Vector3::Zero();        // unit; zero: of no triangle
+
+  bool is_triangle() const { return !front.isZero(0.0); }
+};
+
 // A convex shape where it lies.
 struct PlacedMap {
   const SupportMap& map;
@@ -22,20 +31,22 @@ struct PlacedMap {
   Vector3 farthest(const Vector3& n) const { return p + R * map.support(R.transpose() * n) + map.rounding() * n; }
 };
 
-// Of the faces of `other` that are flush with a rest of `body`, or lower, the normal of the one that leads out the shortest
-// way; zero if there is none.
-Vector3 flush_direction(std::span<const Rest> rests, const PlacedMap& body, const PlacedMap& other,
+// Of the rests of `body` whose planes `other` does not stand above, of a solid those along a flat face of it, the normal of the one
+// that leads out the shortest way; zero if there is none.
+Vector3 flush_direction(std::span<const Rest> rests, const Alone& alone, const PlacedMap& body, const PlacedMap& other,
                         const Vector3& origin, const Vector3& normal, double flush) {
   Vector3 best = Vector3::Zero();
   double least = std::numeric_limits<double>::infinity();
   gravitas::Contour face;
   for (const Rest& rest : rests) {
-    if (rest.is_along(normal)) continue;
+    if (rest.pair == alone.pair || rest.is_along(normal)) continue;
+    Rest level = rest;
     other.map.contour(other.R.transpose() * rest.normal, kFlat, &face);
-    if (!face.is_face()) continue;
-    const Rest level{other.R * face.normal, rest.point, rest.depth};
-    // what rests on edges, as a ball over a gap does, has nothing else to rest on
-    if (!rest.is_along(level.normal) || level.is_along(normal)) continue;
+    const bool has_face = face.is_face() && rest.is_along(other.R * face.normal);
+    // a solid without one, as a post under what rolls over it, is a body by itself
+    if (!has_face && !alone.is_triangle()) continue;
+    if (has_face) level.normal = other.R * face.normal;
+    if (level.is_along(normal) || level.normal.dot(alone.front) < -kFlat) continue;
     const double top = level.height(origin + other.farthest(level.normal));
     const double bottom = level.height(origin + body.farthest(-level.normal));
     if (top > flush || bottom < level.lowest() - flush || !(top - bottom < least)) continue;
@@ -58,10 +69,10 @@ bool may_be_flush(std::span<const Rest> rests, const ContactList& contacts, doub
 }
 
 // The normal from a to b to take instead of this one, of either's rests; zero if there is none.
-Vector3 flush_normal(const PlacedMap& a, const PlacedMap& b, const PairRests& rests, const Vector3& normal,
-                     double flush) {
-  const Vector3 along = -flush_direction(rests.of_a, a, b, rests.origin, -normal, flush);
-  return along.isZero(0.0) ? flush_direction(rests.of_b, b, a, rests.origin, normal, flush) : along;
+Vector3 flush_normal(const PlacedMap& a, const PlacedMap& b, const PairRests& rests, const Alone& alone,
+                     const Vector3& normal, double flush) {
+  const Vector3 along = -flush_direction(rests.of_a, {alone.pair, -alone.front}, a, b, rests.origin, -normal, flush);
+  return along.isZero(0.0) ? flush_direction(rests.of_b, alone, b, a, rests.origin, normal, flush) : along;
 }
 
 }  // namespace
@@ -70,14 +81,20 @@ double flush_length(const Shape& a, const Shape& b) {
   return 1e-6 * std::min(smallest_half_extent(a), smallest_half_extent(b));
 }
 
-void lay_flush(const PlacedPair& pair, const Pose& X_FA, const PairRests& rests, double flush, double margin,
-               Manifold* manifold) {
-  if (rests.are_none() || manifold->count == 0) return;
+Vector3 flush_normal(const PlacedPair& pair, const Vector3& front, const Vector3& normal, const Pose& X_FA,
+                     const PairRests& rests, double flush) {
+  if (rests.are_none()) return Vector3::Zero();
   const Matrix3 R_FA = X_FA.orientation.toRotationMatrix();
   const PlacedMap a{pair.a, R_FA, X_FA.position};
   const PlacedMap b{pair.b, R_FA * pair.R_AB, X_FA.position + R_FA * pair.p_AB};
-  const Vector3 along = flush_normal(a, b, rests, R_FA * manifold->contacts[0].normal, flush);
-  if (!along.isZero(0.0)) contacts_along(pair, R_FA.transpose() * along, margin, nullptr, manifold);
+  return R_FA.transpose() * flush_normal(a, b, rests, {rests.pair, R_FA * front}, R_FA * normal, flush);
+}
+
+void lay_flush(const PlacedPair& pair, const Vector3& front, const Pose& X_FA, const PairRests& rests, double flush,
+               double margin, Manifold* manifold) {
+  if (manifold->count == 0) return;
+  const Vector3 along = flush_normal(pair, front, manifold->contacts[0].normal, X_FA, rests, flush);
+  if (!along.isZero(0.0)) contacts_along(pair, along, margin, nullptr, manifold);
 }
 
 void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
@@ -87,7 +104,7 @@ void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_F
   SupportMapBuffer buffer_a, buffer_b;
   const PlacedMap placed_a{support_map_of(a, &buffer_a), X_FA.orientation.toRotationMatrix(), X_FA.position};
   const PlacedMap placed_b{support_map_of(b, &buffer_b), X_FB.orientation.toRotationMatrix(), X_FB.position};
-  const Vector3 along = flush_normal(placed_a, placed_b, rests, manifold->contacts[0].normal, flush_length(a, b));
+  const Vector3 along = flush_normal(placed_a, placed_b, rests, {}, manifold->contacts[0].normal, flush_length(a, b));
   if (along.isZero(0.0)) return;
   const Matrix3 R_AF = placed_a.R.transpose();
   const PlacedPair pair{placed_a.map, placed_b.map, R_AF * placed_b.R, R_AF * (placed_b.p - placed_a.p)};
@@ -105,6 +122,7 @@ void Seams::add_rest(std::uint32_t body, const Rest& rest, double same_height) {
   for (std::uint32_t i = 0; i < count; ++i) {
     if (!own[i].is_along(rest.normal) || std::fabs(own[i].height(rest.point)) > same_height) continue;
     own[i].depth = std::max(own[i].depth, rest.depth);
+    if (own[i].pair != rest.pair) own[i].pair = Rest::kSeveral;
     return;
   }
   if (count < kMostRests) own[count++] = rest;
@@ -125,8 +143,8 @@ void Seams::find_rests(std::span<const std::uint32_t> pair, std::span<const Cont
     for (std::size_t k = 0; k < contacts[i].size(); ++k) {
       const ContactPoint& contact = contacts[i][k];
       const Vector3 to_surface = 0.5 * contact.depth * contact.normal;
-      add_rest(pair[2 * i], {-contact.normal, contact.point - to_surface, contact.depth}, kSameHeight * margin);
-      add_rest(pair[2 * i + 1], {contact.normal, contact.point + to_surface, contact.depth}, kSameHeight * margin);
+      add_rest(pair[2 * i], {-contact.normal, contact.point - to_surface, contact.depth, i}, kSameHeight * margin);
+      add_rest(pair[2 * i + 1], {contact.normal, contact.point + to_surface, contact.depth, i}, kSameHeight * margin);
     }
 }
 
@@ -139,7 +157,7 @@ void Seams::mend(std::span<const Shape> shapes, const BodyColumns& bodies, std::
     if (contacts[i].size() == 0) continue;
     const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];
     const Shape &shape_a = shapes[bodies.body_shape[a]], &shape_b = shapes[bodies.body_shape[b]];
-    const PairRests rests{rests_of(a), rests_of(b)};
+    const PairRests rests{.of_a = rests_of(a), .of_b = rests_of(b), .pair = i};
     const double flush = flush_length(shape_a, shape_b);
     if (!may_be_flush(rests.of_a, contacts[i], -1.0, flush, margin) &&
         !may_be_flush(rests.of_b, contacts[i], 1.0, flush, margin))

@@ -5,12 +5,13 @@
 // no higher than what it slides on. One pair cannot know this; so after all pairs have been looked at
 //
 //   a body A touches C: the plane of that contact, with the normal m from C to A, through C's surface
-//   A touches B, too, along another normal; B has a flat face with the normal m, no higher than the plane, to 1e-6 of the
-//   smallest half extent; and A lies in B, along m, no deeper than twice as deep as in C
+//   A touches B, too, along another normal; B has a flat face with the normal m, or is a triangle of a mesh, and stands no higher than
+//   the plane, to 1e-6 of the smallest half extent; and A lies in B, along m, no deeper than twice as deep as in C
 //
-// make the contacts of A with B those along m: none where their features do not lie opposite each other there. What stands
-// above the plane is run against as before. The children of a compound and the triangles of a mesh are looked at one by
-// one; among its own triangles a mesh has no seams (composite_pairs.h).
+// make the contacts of A with B those along m: none where their features do not lie opposite each other there. All that A shares
+// with B is then in the layer out of which C lifts it. What stands above the plane is run against as before. The children of a
+// compound and the triangles of a mesh are looked at one by one; among its own triangles a mesh has no seams
+// (composite_pairs.h), and none of its own contacts is a C for them: over its edge each of two faces lies below the other's plane.
 #pragma once
 
 #include <cstdint>
@@ -27,9 +28,12 @@ namespace gravitas::collision {
 
 // What a body touches.
 struct Rest {
-  Vector3 normal;  // unit, from the other body to this one
-  Vector3 point;   // of the other's surface
-  double depth;    // m
+  Vector3 normal;               // unit, from the other body to this one
+  Vector3 point;                // of the other's surface
+  double depth;                 // m
+  std::size_t pair = kSeveral;  // whose contact it is
+
+  static constexpr std::size_t kSeveral = ~std::size_t{0};
 
   double height(const Vector3& x) const { return normal.dot(x - point); }
   double lowest() const { return depth > 0.0 ? -2.0 * depth : 0.0; }
@@ -41,7 +45,9 @@ struct Rest {
 struct PairRests {
   std::span<const Rest> of_a, of_b;
   Vector3 origin = Vector3::Zero();  // of the frame that shapes are placed in, world; as are the rests
+  std::size_t pair = 0;              // the one that is looked at
 
+  void swap() { std::swap(of_a, of_b); }
   bool are_none() const { return of_a.empty() && of_b.empty(); }
 };
 
@@ -51,9 +57,13 @@ double flush_length(const Shape& a, const Shape& b);
 // Replaces the contacts of two bounded convex shapes, in a frame F with world axes, where the above asks for it.
 void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
                double margin, Manifold* manifold);
-// The same of two convex parts, the contacts in the frame of the first, which lies at X_FA.
-void lay_flush(const PlacedPair& pair, const Pose& X_FA, const PairRests& rests, double flush, double margin,
-               Manifold* manifold);
+// The same of a triangle of a mesh, whose front is to this side (unit), and a convex part, with the contacts in the frame of the
+// triangle, which lies at X_FA.
+void lay_flush(const PlacedPair& pair, const Vector3& front, const Pose& X_FA, const PairRests& rests, double flush,
+               double margin, Manifold* manifold);
+// The normal that it takes instead of this one, both in the frame of the triangle; zero where it leaves that.
+Vector3 flush_normal(const PlacedPair& pair, const Vector3& front, const Vector3& normal, const Pose& X_FA,
+                     const PairRests& rests, double flush);
 
 class Seams {
  public:

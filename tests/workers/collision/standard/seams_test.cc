@@ -67,6 +67,44 @@ TEST_F(OverASeam, AMeshIsLaidFlushToo) {
   }
 }
 
+// Wherever both are: pairs that are computed the other way round had a plane to lie flush with that nobody had set.
+TEST_F(OverASeam, WhereTheFloorIsDoesNotMatter) {
+  const Shape& can = shapes.primitive(SceneShape::Kind::kCylinder, {0.1, 0.1, 0.1});
+  for (const Shape* one : {&box, &can})
+    for (const Pose& X : {at(0.0, 0.0, 0.0), at(3.0, 7.0, -2.0), at(-40.0, -30.0, 60.0)})
+      for (const bool is_first : {true, false}) {
+        const Pose body = compose(X, where), other = compose(X, at(1.0, -0.5, 0.0));
+        const Rest rest{floor.normal, X.position + floor.point, floor.depth};
+        const PairRests rests = is_first ? PairRests{{&rest, 1}, {}} : PairRests{{}, {&rest, 1}};
+        ContactList list;
+        if (is_first)
+          collide(*one, body, tile, other, 0.001, &list, &rests);
+        else
+          collide(tile, other, *one, body, 0.001, &list, &rests);
+        ASSERT_GT(list.size(), 0U) << X.position.x();
+        for (std::size_t i = 0; i < list.size(); ++i) {
+          EXPECT_NEAR(list[i].normal.y(), is_first ? -1.0 : 1.0, 1e-12);
+          EXPECT_NEAR(list[i].depth, 0.002, 1e-12);
+        }
+      }
+}
+
+// A block of triangles: its side has no face along the floor's normal, and its top none along the side's.
+TEST_F(OverASeam, ABlockOfTrianglesIsLaidFlushToo) {
+  const Shape& block = shapes.box_mesh({0.5, 0.5, 0.5});
+  for (const bool is_first : {true, false}) {
+    const ContactList list = contacts(block, at(1.0, -0.5, 0.0), floor, is_first);
+    ASSERT_GT(list.size(), 0U);
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      EXPECT_NEAR(list[i].normal.y(), is_first ? -1.0 : 1.0, 1e-12);
+      EXPECT_NEAR(list[i].depth, 0.002, 1e-12);
+    }
+    const ContactList raised = contacts(block, at(1.0, -0.4999, 0.0), floor, is_first);
+    ASSERT_GT(raised.size(), 0U);
+    EXPECT_NEAR(raised[0].normal.x(), is_first ? 1.0 : -1.0, 1e-12);
+  }
+}
+
 // Bit for bit, whichever comes first.
 TEST_F(OverASeam, TheMirrorLawHolds) {
   const ContactList one = contacts(tile, at(1.0, -0.5, 0.0), floor, true);
