@@ -278,6 +278,7 @@ class Run final : private kernel::CommitListener {
       for (const LiveOrder& one : live) live_orders_.push_back(one.known);
       swaps_ = swaps_to_come(resumed, std::move(swaps_), live, catalog_, &taken_over_, &warnings_);
     });
+    leave_out_committed(taken_over_, description_, &faults_);
     // how far hosting may differ is for the command line to say
     for (auto* one : {&answering->now, &answering->begun}) apply_hosting(options_.hosting, one);
   }
