@@ -442,15 +442,16 @@ TEST(Capsule, AnAnswerThatTakesMoreRoomIsTheSame) {
   std::string bodies;
   for (int i = 1; i <= 3; ++i)
     bodies += fmt::format(
-        "Body {{ Id = \"B{0}\" Mass = 1 PrincipalMoments = {{1, 1, 1}} KineticProperties {{ Position = {{{0}, 0, 0}} }} "
+        "Body {{ Id = \"B{0}\" Mass = 1 PrincipalMoments = {{1, 1, 1}} KineticProperties {{ Position = {{{0}, 0, 0}} "
+        "}} "
         "Forces = {{ \"Held\" }} }}\n",
         i);
-  const std::string scene = folder.write(
-      "springs.gravitas",
-      "Forces { Force { Type = \"Spring\" Id = \"Held\" CustomProperties { Stiffness = 10 } } }\n"
-      "Simulator { CustomProperties { TimeStep = 0.001 Duration = 0.003 } }\n"
-      "Environment { Space { Bodies {\n" +
-          bodies + "} }\nKineticIntegrator = \"DormandPrince54\" }\n");
+  const std::string scene =
+      folder.write("springs.gravitas",
+                   "Forces { Force { Type = \"Spring\" Id = \"Held\" CustomProperties { Stiffness = 10 } } }\n"
+                   "Simulator { CustomProperties { TimeStep = 0.001 Duration = 0.003 } }\n"
+                   "Environment { Space { Bodies {\n" +
+                       bodies + "} }\nKineticIntegrator = \"DormandPrince54\" }\n");
   for (const char* kept : {"shm", "grpc"}) {
     const std::string file = folder.path("springs.capsule");
     const ProgramResult captured =
