@@ -32,6 +32,7 @@
 #include "services/run/fault_spec.h"
 #include "services/run/figures.h"
 #include "services/run/file_names.h"
+#include "services/run/handed_hosts.h"
 #include "services/run/interruptible_host.h"
 #include "services/run/machine_limits.h"
 #include "services/run/report.h"
@@ -159,7 +160,7 @@ class Run final : private kernel::CommitListener {
   }
 
   kernel::HostStarter starter() {
-    return interruptible(with_fault_desk(options_.starter, &environment_),
+    return interruptible(with_fault_desk(hosts_.for_environment(), &environment_),
                          [this] { return is_stepping_ && interrupted_(); });
   }
 
@@ -504,6 +505,7 @@ class Run final : private kernel::CommitListener {
 
   const RunOptions& options_;
   const std::function<bool()>& interrupted_;
+  const HandedHosts hosts_{options_.starter};
   bool is_stepping_ = false, is_unrepeatable_ = false;
   std::vector<std::string> warnings_;
   Catalog catalog_;
