@@ -201,7 +201,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error);
   // The inner step that ends at the next event, of at most `length`, for which S* is in place.
   NextStop first_impact(const Trusted<TrialState>& trial, double begin, double length);
-  double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
+  double bisect(const Trusted<TrialState>& trial, double begin, double length, bool* is_near);
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   double first_limit(double begin, double length, bool* passes);                                            // limits.cc
   void open_parting_contacts();                                                                             // limits.cc

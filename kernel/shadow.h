@@ -32,6 +32,7 @@ class Shadow {
   void add_times(std::uint64_t first_ns, std::uint64_t second_ns) {
     result_.first_ns += first_ns, result_.second_ns += second_ns;
   }
+  void add_refusal(const std::string& why) { result_.add_refusal(why); }
 
   // From here on, be it while answers are compared.
   void count_anew() { result_ = {}; }

@@ -175,9 +175,7 @@ void StageSlot::cut_over(PendingSwap* swap) {
 
 void StageSlot::refuse(PendingSwap* swap, const std::string& reason) {
   SwapRecord& record = swaps_[swap->record];
-  record.state = SwapState::kRefused;
-  record.reason = reason;
-  record.shadow = swap->shadow.result();
+  record.state = SwapState::kRefused, record.reason = reason, record.shadow = swap->shadow.result();
   if (swap->candidate) {
     swap->candidate->kill();
     hosts_[swap->host]->retire(std::move(swap->candidate));
@@ -192,8 +190,7 @@ void StageSlot::close_all_probations(SlotHost* host, SwapState state, const std:
 void StageSlot::close_probation(const SlotHost* host, SwapState state, const std::string& reason) {
   std::erase_if(probation_, [&](const Probation& one) {
     if (one.host != host) return false;
-    swaps_[one.record].state = state;
-    swaps_[one.record].reason = reason;
+    swaps_[one.record].state = state, swaps_[one.record].reason = reason;
     return true;
   });
 }
@@ -239,6 +236,8 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, const CallT
     return true;
   } catch (const StageFault& fault) {
     if (!fault.plugin.empty()) throw;
+    // an answer, where nobody goes on with it
+    if (fault.kind == FaultKind::kRefusal && swap->only_compare) return swap->shadow.add_refusal(fault.text()), true;
     if (fault.kind != FaultKind::kDeadline || swap->only_compare) {
       refuse(swap, "in shadow: " + fault.text());
       return false;

@@ -93,6 +93,11 @@ std::optional<FirstDifference> Comparison::add(stage::Method method, Columns fir
   return found;
 }
 
+void Comparison::add_refusal(const std::string& why) {
+  ++calls, ++differing_calls;
+  if (refused_calls++ == 0) first_refusal = why;
+}
+
 bool Comparison::is_alike(const stage::ColumnInfo& column, std::span<const std::byte> first,
                           std::span<const std::byte> second) {
   Disagreement unused{{}, &column};

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -38,6 +39,8 @@ class Comparison {
 
   std::uint64_t calls = 0;
   std::uint64_t differing_calls = 0;          // whose answers were not alike
+  std::uint64_t refused_calls = 0;            // of these: by the second alone
+  std::string first_refusal;                  // why
   std::uint64_t first_ns = 0, second_ns = 0;  // in which each of the two worked, where that is known
   std::vector<Disagreement> disagreements;    // of columns that were not the same bytes
 
@@ -48,6 +51,9 @@ class Comparison {
 
   // Counts a call in: `first` and `second` are the bytes of the columns of the two replies. Where they differ first.
   std::optional<FirstDifference> add(stage::Method method, Columns first, Columns second);
+
+  // Counts in a call that the second refused.
+  void add_refusal(const std::string& why);
 
   // Whether two columns are alike; no call is counted.
   bool is_alike(const stage::ColumnInfo& column, std::span<const std::byte> first, std::span<const std::byte> second);

@@ -4,7 +4,11 @@
 //
 // One inner step more tells: what rests where the part ends, and does not then, may have begun before. It is as long as the others:
 // of what is redundant, a solver goes on with the solution that it has, and may find another for a step of another length.
+//
+// Where it gives way in the last inner step of each of the attempts that count, these end with a slip in proportion to that step, which
+// is extrapolated to none: what slides where the finest of them ends, and rests where they are extrapolated to, has given way, too.
 #include <algorithm>
+#include <utility>
 
 #include "kernel/environment.h"
 #include "kernel/simulators/location.h"
@@ -19,7 +23,8 @@ constexpr double kAtRest = 0.01;  // of the accuracy, m/s or rad/s: slower is at
 
 }  // namespace
 
-// Whether what rests at the end of the attempt in front() gains more than the accuracy in a time as long as the part.
+// Whether what rests where the attempts are extrapolated to does not at the end of the one in front(), or gains more than the accuracy
+// from there in a time as long as the part.
 bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
   const double accuracy = description_.accuracy;
   const auto pressed = [&](std::size_t i) {
@@ -35,6 +40,34 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
   const auto may_turn = [&](std::size_t i) {
     return coefficient(i, kRollingFriction) > 0.0 || coefficient(i, kSpinningFriction) > 0.0;
   };
+  const auto gives_way = [&](std::size_t i) { return pressed(i) > 0.0 && (static_friction(i) > 0.0 || may_turn(i)); };
+  // how fast its bodies slide on each other, and turn
+  const auto slip_and_turn = [&](std::size_t i, const auto& twist_of) {
+    const Vector3 normal = vector_at(data_.contact_normal.span(), i);
+    const auto at_contact = [&](std::uint32_t body) {
+      const Twist twist = twist_of(body);
+      const Vector3 arm = vector_at(data_.contact_point.span(), i) - vector_at(data_.trial_position.span(), body);
+      return Twist{twist.linear + twist.angular.cross(arm), twist.angular};
+    };
+    const Twist one = at_contact(data_.contact_body[2 * i]), two = at_contact(data_.contact_body[2 * i + 1]);
+    const Vector3 apart = two.linear - one.linear;
+    return std::pair((apart - normal.dot(apart) * normal).norm(),
+                     may_turn(i) ? (two.angular - one.angular).norm() : 0.0);
+  };
+  const auto solved = [&](std::uint32_t body) {
+    return Twist{vector_at(data_.solved_linear_velocity.span(), body),
+                 vector_at(data_.solved_angular_velocity.span(), body)};
+  };
+  const auto extrapolated = [&](std::uint32_t body) {
+    const double* twist = &extrapolation_.best()[kExtrapolated * body + kExtrapolatedTwist];
+    return Twist{{twist[0], twist[1], twist[2]}, {twist[3], twist[4], twist[5]}};
+  };
+  const auto only_seems_to_rest = [&](double best, double last) { return best <= accuracy && last - best > accuracy; };
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+    if (!gives_way(i)) continue;
+    const auto best = slip_and_turn(i, extrapolated), at_end = slip_and_turn(i, solved);
+    if (only_seems_to_rest(best.first, at_end.first) || only_seems_to_rest(best.second, at_end.second)) return true;
+  }
   bool any_bears = false;
   for (std::size_t i = 0; i < data_.contact_key.size() && !any_bears; ++i) {
     const Vector3 impulse = vector_at(data_.contact_impulse.span(), i);
@@ -48,7 +81,7 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
   if (lets_go()) return false;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     // what has given way bears next to nothing where dynamic friction is small
-    if (!(pressed(i) > 0.0) || !(static_friction(i) > 0.0 || may_turn(i))) continue;
+    if (!gives_way(i)) continue;
     const std::uint32_t* pair = &data_.contact_body[2 * i];
     const Vector3 point = vector_at(data_.contact_point.span(), i), normal = vector_at(data_.contact_normal.span(), i);
     const auto motion = [&](std::uint32_t body) {
@@ -57,17 +90,14 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
           pose_of(data_.trial_position, data_.trial_orientation, body),
           {vector_at(start_linear_velocity().span(), body), vector_at(start_angular_velocity().span(), body)}};
     };
-    const auto turning = [&](const Column<double>& angular) {
-      return (vector_at(angular.span(), pair[1]) - vector_at(angular.span(), pair[0])).norm();
-    };
     const auto begins = [&](double before, double then) {
       return before <= kAtRest * accuracy && (then - before) * pieces > accuracy;
     };
-    const Vector3 apart =
-        contact_velocity(data_, i, data_.trial_position, data_.solved_linear_velocity, data_.solved_angular_velocity);
-    if (begins(start_slip(point, point, normal, motion(pair[0]), motion(pair[1])).norm(),
-               (apart - normal.dot(apart) * normal).norm()) ||
-        (may_turn(i) && begins(turning(start_angular_velocity()), turning(data_.solved_angular_velocity))))
+    const auto then = slip_and_turn(i, solved);
+    const Vector3 turning =
+        vector_at(start_angular_velocity().span(), pair[1]) - vector_at(start_angular_velocity().span(), pair[0]);
+    if (begins(start_slip(point, point, normal, motion(pair[0]), motion(pair[1])).norm(), then.first) ||
+        (may_turn(i) && begins(turning.norm(), then.second)))
       return true;
   }
   return false;

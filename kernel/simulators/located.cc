@@ -21,7 +21,6 @@ namespace {
 
 constexpr int kMostInnerSteps = 10'000, kMostBisections = 200, kMostTrials = 200;
 constexpr std::size_t kMostSlides = 8, kMostSlidesOfPair = 4;    // whose ends are met in a step
-constexpr double kShortestFlight = 1e-6;                         // of the step
 constexpr double kSlopOfArm = 2e-9, kSlopOfCoordinates = 4e-15;  // twice the gaps that solvers take for none
 
 }  // namespace
@@ -38,8 +37,7 @@ void Environment::locate_events(double begin, double length) {
     begin_inner_step(begin + done, left);
     Trusted<TrialState> trial = integrate();
     if (inner < (bisects ? kMostBisections : kMostInnerSteps)) {
-      stop = bisects ? bisect(trial, begin + done, left, is_near) : first_impact(trial, begin + done, left).length;
-      is_near = !is_near && stop < left;
+      stop = bisects ? bisect(trial, begin + done, left, &is_near) : first_impact(trial, begin + done, left).length;
       lead = stop;
       has_found_contacts = bisects && stop == data_.time_step[0];
       if (stop != data_.time_step[0]) {

@@ -10,8 +10,11 @@
 
 namespace gravitas::kernel {
 
-inline constexpr double kTargetShare = 1e-8;  // of the margin: gap at which a pair has met, overlap that is none
-inline constexpr double kFinest = 1e-13;      // of the step: its shortest part
+inline constexpr double kTargetShare = 1e-8;     // of the margin: gap at which a pair has met, overlap that is none
+inline constexpr double kFinest = 1e-13;         // of the step: its shortest part
+inline constexpr double kShortestFlight = 1e-6;  // of the step
+inline constexpr std::size_t kExtrapolated = 13,
+                             kExtrapolatedTwist = 7;  // numbers of a body; where its velocities begin
 
 // Is the pair the next one of these (two ids each)? Both ascend from question to question, so that those before it are dropped.
 inline bool starts_with(std::span<const std::uint32_t> pair, std::span<const std::uint32_t>* pairs) {

@@ -2,6 +2,7 @@
 // no frame but those of its bodies. Angles are the same where they differ by whole turns.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "plugin_sdk/conformance/hostile_numbers.h"
 #include "plugin_sdk/conformance/joints.h"
@@ -121,8 +122,8 @@ void judge_frames(Subject& subject) {
   });
 }
 
-// Joints of all types, three of each, the second with values of every property.
-Joints several(Subject& subject, Draw* draw) {
+// Joints of all types, three of each, the second with values of every property if it varies.
+Joints several(Subject& subject, bool varies, Draw* draw) {
   const std::vector<TypeDeclaration> types = joint_types_of(subject);
   Joints all;
   for (int i = 0; i < 4; ++i) all.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
@@ -132,14 +133,14 @@ Joints several(Subject& subject, Draw* draw) {
                             .body1 = copy == 2 ? kNone : copy,
                             .body2 = copy + 1,
                             .properties = sample_values(type.properties, draw)});
-  for (std::size_t i = 0; i < types.size(); ++i) vary_joint(subject, types[i], types.size() + i, draw, &all);
+  for (std::size_t i = 0; i < types.size() && varies; ++i) vary_joint(subject, types[i], types.size() + i, draw, &all);
   return all;
 }
 
 // A broken joint tells nothing, and what the others tell is no matter of it; asked again they tell the same.
-void judge_broken(Subject& subject) {
+void judge_broken(Subject& subject, bool varies) {
   Draw draw(73);
-  Joints all = several(subject, &draw);
+  Joints all = several(subject, varies, &draw);
   if (all.joints.empty()) return;
   Inquiry inquiry(subject, "coordinates of " + std::to_string(all.joints.size()) + " joints, and with one broken");
   all.bind(&inquiry);
@@ -182,25 +183,19 @@ std::vector<Case> coordinate_cases(const PluginDeclaration& declaration) {
       make_case("constraint/coordinate_rates", "A coordinate's rate is how it changes as its bodies move.",
                 judge_rates),
       make_case("constraint/coordinate_frames", "Coordinates know no frame but those of their bodies.", judge_frames),
-      make_case("constraint/coordinate_rows", "A broken joint has no coordinates, and changes those of no other.",
-                judge_broken),
+      make_varied_case("constraint/coordinate_rows",
+                       "A broken joint has no coordinates, and changes those of no other.", judge_broken),
       make_case("constraint/coordinate_hostile",
                 "Hostile numbers are refused with a reason, or answered with finite ones.", judge_hostile_coordinates)};
 }
 
 std::vector<Question> coordinate_questions(Subject& subject, Draw* draw) {
   if (!has_capability(subject.declaration(), "coordinates")) return {};
-  Joints all = several(subject, draw);
-  if (all.joints.empty()) return {};
-  try {
-    Inquiry inquiry(subject, "several joints");
-    all.bind(&inquiry);
-  } catch (const Finding&) {
-    return {};  // C5 says what is wrong with its bind
-  }
-  for (JointedBody& body : all.bodies) body.pose = displaced(body.pose, draw->vector(0.1), draw->vector(0.1));
+  const std::optional<Joints> all =
+      bound_and_moved(subject, kCoordinates, 0.1, draw, [&](bool varies) { return several(subject, varies, draw); });
+  if (!all || all->joints.empty()) return {};
   return {
-      {"coordinates of " + std::to_string(all.joints.size()) + " joints", kCoordinates, all.describe_request(), {}}};
+      {"coordinates of " + std::to_string(all->joints.size()) + " joints", kCoordinates, all->describe_request(), {}}};
 }
 
 }  // namespace gravitas::conformance

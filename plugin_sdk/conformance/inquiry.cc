@@ -64,6 +64,16 @@ Case make_case(std::string name, std::string claim, std::function<void(Subject&)
           }};
 }
 
+Case make_varied_case(std::string name, std::string claim, std::function<void(Subject&, bool varies)> judge) {
+  return make_case(std::move(name), std::move(claim), [judge = std::move(judge)](Subject& subject) {
+    try {
+      judge(subject, true);
+    } catch (const Refused&) {
+      judge(subject, false);
+    }
+  });
+}
+
 MessageColumns empty_request(stage::Method method) { return MessageColumns(stage::method_info(method).request); }
 MessageColumns empty_reply(stage::Method method) { return MessageColumns(stage::method_info(method).reply); }
 
@@ -100,6 +110,8 @@ void Inquiry::expect_finite(stage::Method method, const MessageColumns& reply) c
 MessageColumns Inquiry::answer(stage::Method method, const MessageColumns& request,
                                const DerivativeFunction& derivative) {
   Answer answer = ask(method, request, derivative);
+  if (is_refusal(answer) && !answer.text.empty())
+    throw Refused(asked_ + ": must be answered, came: " + outcome_of(answer));
   if (!answer.ok()) fail("must be answered, came: " + outcome_of(answer));
   expect_finite(method, answer.columns);
   return std::move(answer.columns);
@@ -112,8 +124,7 @@ std::optional<MessageColumns> Inquiry::answer_or_refusal(stage::Method method, c
     expect_finite(method, answer.columns);
     return std::move(answer.columns);
   }
-  if (!answer.fault.empty() || answer.status != GRAVITAS_REFUSED)
-    fail("must be refused, or answered with finite numbers; came: " + outcome_of(answer));
+  if (!is_refusal(answer)) fail("must be refused, or answered with finite numbers; came: " + outcome_of(answer));
   expect(!answer.text.empty(), "was refused without a reason");
   return std::nullopt;
 }
@@ -121,8 +132,7 @@ std::optional<MessageColumns> Inquiry::answer_or_refusal(stage::Method method, c
 void Inquiry::demand_refusal(stage::Method method, const MessageColumns& request,
                              const DerivativeFunction& derivative) {
   const Answer answer = ask(method, request, derivative);
-  if (!answer.fault.empty() || answer.status != GRAVITAS_REFUSED)
-    fail("must be refused (GRAVITAS_REFUSED and a reason); came: " + outcome_of(answer));
+  if (!is_refusal(answer)) fail("must be refused (GRAVITAS_REFUSED and a reason); came: " + outcome_of(answer));
   expect(!answer.text.empty(), "was refused without a reason");
 }
 

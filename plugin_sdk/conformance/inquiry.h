@@ -27,8 +27,17 @@ class Finding : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// The subject refused, with a reason, what it must answer.
+class Refused : public Finding {
+ public:
+  using Finding::Finding;
+};
+
 // A case whose judge throws a Finding where the claim fails.
 Case make_case(std::string name, std::string claim, std::function<void(Subject&)> judge);
+// One that asks with drawn values of properties that need not be given, too (vary() of sample_values.h), which may be refused in
+// any state: then it asks again without.
+Case make_varied_case(std::string name, std::string claim, std::function<void(Subject&, bool varies)> judge);
 
 // A request with every single value zero and no rows.
 MessageColumns empty_request(stage::Method method);
@@ -39,6 +48,8 @@ void append(std::vector<double>* column, const Quaternion& q);
 
 std::string shown(const Vector3& v);
 std::string shown(const Quaternion& q);
+
+inline bool is_refusal(const Answer& answer) { return answer.fault.empty() && answer.status == GRAVITAS_REFUSED; }
 
 class Inquiry {
  public:

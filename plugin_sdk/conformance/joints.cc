@@ -135,6 +135,22 @@ void vary_joint(Subject& subject, const TypeDeclaration& type, std::size_t joint
   world->joints[joint] = alone.joints[0];
 }
 
+std::optional<Joints> bound_and_moved(Subject& subject, stage::Method method, double way, Draw* draw,
+                                      const std::function<Joints(bool varies)>& make) {
+  for (const bool varies : {true, false}) {
+    Joints joints = make(varies);
+    try {
+      Inquiry inquiry(subject, "several joints");
+      joints.bind(&inquiry);
+    } catch (const Finding&) {
+      return std::nullopt;  // C5 says what is wrong with its bind
+    }
+    for (JointedBody& body : joints.bodies) body.pose = displaced(body.pose, draw->vector(way), draw->vector(way));
+    if (!varies || !is_refusal(subject.ask(method, joints.describe_request()))) return joints;
+  }
+  return std::nullopt;
+}
+
 double error_of(const Discrepancy& discrepancy) {
   return joint_error(discrepancy, discrepancy.point2 - discrepancy.point1);
 }

@@ -1,6 +1,8 @@
 // Joints between bodies for questions to a constraint: bound at the present poses, described in any state.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "plugin_sdk/body.h"
@@ -61,6 +63,11 @@ std::vector<TypeDeclaration> joint_types_of(Subject& subject, std::string* refus
 
 // Draws values of every property of a joint, where it can be bound and described with these.
 void vary_joint(Subject& subject, const TypeDeclaration& type, std::size_t joint, Draw* draw, Joints* world);
+
+// Joints that are bound, and their bodies moved by up to `way` (m, rad): those of make(true), or where `method` refuses these,
+// of make(false). Nothing where they cannot be bound.
+std::optional<Joints> bound_and_moved(Subject& subject, stage::Method method, double way, Draw* draw,
+                                      const std::function<Joints(bool varies)>& make);
 
 // Error x2 - x1 of a discrepancy as joint_error() measures it.
 double error_of(const Discrepancy& discrepancy);

@@ -37,6 +37,7 @@ struct Mechanism {
   ConstrainedBodies world;
   std::vector<double> drag;          // 1/s; a body without: 0
   std::vector<Twist> accelerations;  // of kinematic bodies
+  std::vector<Discrepancy> start;    // of its joints in S_n; none: not told
 
   Reactions ask(Inquiry* inquiry) const {
     Reactions came(inquiry->answer(kReactions, request()));
@@ -57,6 +58,18 @@ struct Mechanism {
       const Twist given = i < accelerations.size() ? accelerations[i] : Twist{};
       append(&columns.f64("acceleration"), given.linear);
       append(&columns.f64("acceleration"), given.angular);
+    }
+    for (const Discrepancy& d : start) {
+      append(&columns.f64("start_point1"), d.point1);
+      append(&columns.f64("start_point2"), d.point2);
+      append(&columns.f64("start_velocity"), d.velocity);
+      append(&columns.f64("start_axes"), d.axes);
+      columns.u32("start_mode").push_back(d.modes);
+      append(&columns.f64("start_lower"), d.lower);
+      append(&columns.f64("start_upper"), d.upper);
+      append(&columns.f64("start_compliance"), d.compliance);
+      append(&columns.f64("start_damping"), d.damping);
+      append(&columns.f64("start_acceleration"), d.acceleration);
     }
     return columns;
   }
@@ -201,6 +214,40 @@ void judge_springs(Subject& subject) {
   inquiry.expect_near("velocity", sprung.world.twists(solved)[load].linear, Vector3(0.5, 0, 0), 0.0);
 }
 
+// Limits that were closed in S_n hold, and drives that were at their speed, by what joints tell there. A load is pulled along x with
+// 3 N, and its joint in the state that is asked about is the same each time.
+void judge_start(Subject& subject) {
+  Mechanism pulled;
+  const std::uint32_t load = pulled.world.add({.mass = 2.0});
+  pulled.world.wrench[load].force = Vector3(3, 0, 0);
+  const auto expect = [&](const char* asked, const Discrepancy& joint, const Discrepancy& at_start, double force) {
+    pulled.world.joints = {{.body1 = kNone, .body2 = load, .discrepancy = joint}};
+    pulled.start = {at_start};
+    Inquiry inquiry(subject, std::string("2 kg at rest that 3 N pull along x, at ") + asked);
+    const Reactions came = pulled.ask(&inquiry);
+    inquiry.expect_near("force", came.force(load), Vector3(force, 0, 0), 1e-8);
+    inquiry.expect_near("torque", came.torque(load), Vector3::Zero(), 1e-8);
+  };
+  Discrepancy limit;
+  limit.modes = pack_modes(AxisMode::kLimited, AxisMode::kFree, AxisMode::kFree);
+  limit.lower.x() = -kUnlimited;
+  expect("the end of a limit that was closed in S_n", limit, limit, -3.0);
+  Discrepancy open = limit;
+  open.upper.x() = 0.3;
+  expect("the end of a limit that was 0.3 m further in S_n", limit, open, 0.0);
+  open = limit;
+  open.point1.x() = 0.3;
+  expect("the end of a limit that was 0.3 m open in S_n", limit, open, 0.0);
+
+  Discrepancy drive;
+  drive.modes = pack_modes(AxisMode::kDriven, AxisMode::kFree, AxisMode::kFree);
+  drive.maximum_force.x() = 5.0;
+  expect("the speed of a drive of 5 N that was its speed in S_n", drive, drive, -3.0);
+  Discrepancy faster = drive;
+  faster.velocity.x() = 1.0;
+  expect("the speed of a drive of 5 N that asked for 1 m/s in S_n", drive, faster, 5.0);
+}
+
 void judge_twice(Subject& subject) {
   Draw draw(92);
   Mechanism chain = swinging_chain(&draw, 3, false);
@@ -313,6 +360,7 @@ std::vector<Case> reaction_cases(const PluginDeclaration& declaration) {
                 judge_accelerations),
       make_case("solver/reactions_springs", "Springs of joints are among the reactions, and not applied again.",
                 judge_springs),
+      make_case("solver/reactions_start", "Limits and drives hold by what joints tell of the start.", judge_start),
       make_case("solver/reactions_twice", "Joints that hold what is held already change nothing.", judge_twice),
       make_case("solver/reactions_refusals", "Bodies that do not exist and numbers that are none are refused.",
                 judge_reaction_refusals)};

@@ -73,8 +73,6 @@ void append_drawn(const Property& p, bool varies, const Matrix3& axes, int* next
   }
 }
 
-bool is_refusal(const Answer& answer) { return answer.fault.empty() && answer.status == GRAVITAS_REFUSED; }
-
 // Of a property whose values begin there.
 std::size_t size_at(const Property& p, const double* values) {
   return p.kind == PropertyKind::kTable ? 1 + static_cast<std::size_t>(*values) * p.columns : p.flat_size();

@@ -21,7 +21,7 @@ namespace gravitas::conformance {
 std::vector<double> sample_values(const std::vector<Property>& properties, Draw* draw);
 
 // Draws values of every property in place of such values, also of those that have a default or may be absent, unless what is
-// asked with these is refused each time. Bodies that may be absent stay so: what a force says of two bodies depends on
+// asked with these is refused each time. In another state they may be refused still: make_varied_case(). Bodies that may be absent stay so: what a force says of two bodies depends on
 // all that it is applied to.
 void vary(const std::vector<Property>& properties, Draw* draw, std::vector<double>* values,
           const std::function<Answer()>& asked);

@@ -71,7 +71,7 @@ ServedRun::~ServedRun() {
 }
 
 kernel::HostStarter ServedRun::starter() {
-  return interruptible(with_fault_desk(capsule::recording(tape_), &environment_), [this] { return is_ending_.load(); });
+  return interruptible(with_fault_desk(hosts_.for_environment(), &environment_), [this] { return is_ending_.load(); });
 }
 
 void ServedRun::begin_environment(const Resumption* from) {

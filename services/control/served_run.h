@@ -36,6 +36,7 @@
 #include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/run/figures.h"
+#include "services/run/handed_hosts.h"
 #include "services/run/interruptible_host.h"
 #include "services/run/report.h"
 #include "services/run/resumption.h"
@@ -236,6 +237,7 @@ class ServedRun final : private kernel::CommitListener {
   std::unique_ptr<Figures> figures_;
   std::unique_ptr<Recorder> recorder_;
   const std::shared_ptr<capsule::Tape> tape_ = std::make_shared<capsule::Tape>();
+  const HandedHosts hosts_{capsule::recording(tape_)};
   std::optional<Capture> capture_;
   std::vector<std::weak_ptr<Subscription>> subscriptions_;
   std::shared_ptr<RemoteListener> listener_;

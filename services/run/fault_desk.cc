@@ -211,6 +211,16 @@ std::string fault_text(const kernel::FaultInjection& fault) {
                      fault.times > 1 ? fmt::format(",times={}", fault.times) : "");
 }
 
+void leave_out_committed(std::span<const recorder::v1::Decision> taken_over,
+                         const kernel::EnvironmentDescription& description,
+                         std::vector<kernel::FaultInjection>* orders) {
+  std::erase_if(*orders, [&](const kernel::FaultInjection& order) {
+    return std::ranges::any_of(taken_over, [&](const recorder::v1::Decision& one) {
+      return one.step() == order.step && share_process(description, one.slot(), slot_name(order.slot));
+    });
+  });
+}
+
 void name_orders(std::span<const kernel::FaultInjection> orders, const kernel::EnvironmentDescription& description,
                  StepsMade steps, bool is_over, report::v1::Report* report) {
   for (const kernel::FaultInjection& order : orders) {

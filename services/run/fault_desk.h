@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
 
@@ -21,6 +22,12 @@ kernel::HostStarter with_fault_desk(kernel::HostStarter starter, const std::uniq
 // can be made to commit, and what kernel::Environment::inject() throws.
 void order_fault(const kernel::FaultInjection& fault, const kernel::EnvironmentDescription& description,
                  std::span<const kernel::SwapOrder> swaps, kernel::Environment* world);
+
+// Leaves out the orders of steps in which somebody else took over in their slot's process, as a journal has it: they were
+// committed before, and who answers there from the beginning of the step is not meant.
+void leave_out_committed(std::span<const recorder::v1::Decision> taken_over,
+                         const kernel::EnvironmentDescription& description,
+                         std::vector<kernel::FaultInjection>* orders);
 
 // As --fault has it.
 std::string fault_text(const kernel::FaultInjection& fault);

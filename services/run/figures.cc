@@ -165,6 +165,14 @@ void Figures::find_overlaps(const kernel::InnerStep& inner) {
                             quaternion_at(data.trial_orientation.span(), body).conjugate();
     return Vector3(to + turn * (point - from));
   };
+  // of the body's extent along the normal, at most
+  const auto half_width = [&](std::uint32_t body, const Vector3& normal) {
+    const LocalBound& bound = description_.bodies[body].bound;
+    if (bound.reach == 0.0) return HUGE_VAL;
+    if (bound.kind != BoundKind::kBox) return bound.reach;
+    const Quaternion box = quaternion_at(inner.before.orientation.span(), body) * bound.orientation;
+    return std::min(bound.reach, (box.conjugate() * normal).cwiseAbs().dot(bound.half_extents));
+  };
   std::uint32_t last_one = kNone, last_two = kNone;
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < data.contact_depth.size(); ++i) {
@@ -175,6 +183,8 @@ void Figures::find_overlaps(const kernel::InnerStep& inner) {
     const double depth = normal.dot(apart);
     // points that have come from elsewhere tell nothing
     if ((apart - depth * normal).norm() > depth) continue;
+    // nor does a way out that is the longer of the two: the step has led through the middle
+    if (depth > half_width(one, normal) + half_width(two, normal)) continue;
     if (!(depth > kOverlap * std::min(size(one), size(two)))) continue;
     if (one != last_one || two != last_two) ++pairs;
     last_one = one, last_two = two;

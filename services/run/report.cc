@@ -133,6 +133,8 @@ void write_disagreement(const Disagreement& from, report::v1::Disagreement* to) 
 void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to) {
   to->set_calls(from.calls);
   to->set_differing_calls(from.differing_calls);
+  to->set_refused_calls(from.refused_calls);
+  to->set_first_refusal(from.first_refusal);
   const double per_call = from.calls == 0 ? 0.0 : 1e-3 / static_cast<double>(from.calls);
   to->set_from_us(per_call * static_cast<double>(from.first_ns));
   to->set_to_us(per_call * static_cast<double>(from.second_ns));
@@ -146,8 +148,11 @@ void write_comparison(const Comparison& from, const kernel::Environment& environ
 
 std::string comparison_text(const report::v1::Comparison& comparison, const std::string& from, const std::string& to) {
   if (comparison.calls() == 0) return "no answer was compared";
-  return fmt::format("{} of {} answers differ; {} {:.3g} us, {} {:.3g} us a call", comparison.differing_calls(),
-                     comparison.calls(), from, comparison.from_us(), to, comparison.to_us());
+  const std::string refused = comparison.refused_calls() == 0
+                                  ? ""
+                                  : fmt::format(" (in {} {})", comparison.refused_calls(), comparison.first_refusal());
+  return fmt::format("{} of {} answers differ{}; {} {:.3g} us, {} {:.3g} us a call", comparison.differing_calls(),
+                     comparison.calls(), refused, from, comparison.from_us(), to, comparison.to_us());
 }
 
 std::string disagreement_text(const report::v1::Disagreement& disagreement) {

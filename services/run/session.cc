@@ -32,6 +32,7 @@
 #include "services/run/fault_spec.h"
 #include "services/run/figures.h"
 #include "services/run/file_names.h"
+#include "services/run/handed_hosts.h"
 #include "services/run/interruptible_host.h"
 #include "services/run/machine_limits.h"
 #include "services/run/report.h"
@@ -159,7 +160,7 @@ class Run final : private kernel::CommitListener {
   }
 
   kernel::HostStarter starter() {
-    return interruptible(with_fault_desk(options_.starter, &environment_), [this] {
+    return interruptible(with_fault_desk(hosts_.for_environment(), &environment_), [this] {
       if (is_stepping_) figures_->count_call();
       return is_stepping_ && interrupted_();
     });
@@ -280,6 +281,7 @@ class Run final : private kernel::CommitListener {
       for (const LiveOrder& one : live) live_orders_.push_back(one.known);
       swaps_ = swaps_to_come(resumed, std::move(swaps_), live, catalog_, &taken_over_, &warnings_);
     });
+    leave_out_committed(taken_over_, description_, &faults_);
     // how far hosting may differ is for the command line to say
     for (auto* one : {&answering->now, &answering->begun}) apply_hosting(options_.hosting, one);
   }
@@ -505,6 +507,7 @@ class Run final : private kernel::CommitListener {
 
   const RunOptions& options_;
   const std::function<bool()>& interrupted_;
+  const HandedHosts hosts_{options_.starter};
   bool is_stepping_ = false, is_unrepeatable_ = false;
   std::vector<std::string> warnings_;
   Catalog catalog_;

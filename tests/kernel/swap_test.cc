@@ -199,6 +199,25 @@ TEST_P(Swapped, ComparisonChangesNoBitAndNeverCutsOver) {
   EXPECT_TRUE(world.faults().empty());
 }
 
+// It is counted, and the comparison goes on: what it could not do in one step it may in the next.
+TEST_P(Swapped, ARefusalIsAnAnswerThatIsCompared) {
+  Environment world(builder().description());
+  kernel::PluginChoice strict = other(Slot::kIntegrator, plugin_path("integrator_dormand_prince54"));
+  strict.settings = {1e-300, 0.0};  // Accuracy, which no step meets
+  world.order_swap({Slot::kIntegrator, strict, std::nullopt, 0}, true);
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
+  EXPECT_THAT(world.faults(), ::testing::IsEmpty());
+  ASSERT_EQ(world.swaps().size(), 1U);
+  EXPECT_EQ(world.swaps()[0].state, SwapState::kShadow);
+  const Comparison compared = world.swaps()[0].shadow;
+  EXPECT_EQ(compared.calls, kSwapSteps);
+  EXPECT_EQ(compared.differing_calls, kSwapSteps);
+  EXPECT_EQ(compared.refused_calls, kSwapSteps);
+  EXPECT_THAT(compared.first_refusal, HasSubstr("it refused: Accuracy cannot be met"));
+  EXPECT_TRUE(compared.disagreements.empty());
+}
+
 // Euler, compared with it, and Euler in its place: before they differ in every step, then in none.
 TEST_P(Swapped, AComparisonCountsAnewBesideWhoTakesOver) {
   Environment world(builder().description());

@@ -376,5 +376,37 @@ TEST(BounceAtAStop, IsOneOfItsOwn) {
   EXPECT_EQ(places, 45);
 }
 
+// Flights shorter than a step: what began in it, and was closed again where it ended, was at rest, with `Bisection`.
+TEST(BounceWithinAStep, IsOneLikeAnyOther) {
+  constexpr double kDuration = 1.2;
+  for (const std::string simulator : {"Continuous", "Bisection"})
+    for (const double restitution : {1.0, 0.99})
+      for (const double height : {3e-4, 1e-3}) {
+        SceneRun run(
+            "Geometries { Geometry { Type = \"Halfspace\" Id = \"Flat\" } Geometry { Type = \"Sphere\" Id = \"Round\" "
+            "CustomProperties { Radius = 0.01 } } }\nMaterials { Material { Id = \"M\" RestitutionCoefficient = " +
+                literal(restitution) +
+                " } }\nForces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, "
+                "0} "
+                "} } }\nSimulator { CustomProperties { SleepEnergy = 0 } }\nEnvironment { Space { Bodies { Body { Id = "
+                "\"Floor\" GeometryId = \"Flat\" Material = \"M\" Immovable = true }\nBody { Id = \"Ball\" GeometryId "
+                "= "
+                "\"Round\" Mass = 1 Material = \"M\" Forces = {\"Down\"} KineticProperties { Position = " +
+                literal(Vector3(0.0, 0.01 + height, 0.0)) + " } } } } }",
+            {set("Simulator", simulator), set("Simulator.TimeStep", 1.0 / 60.0), set("Simulator.Duration", kDuration)});
+        run.to_end();
+        double speed = std::sqrt(2.0 * kG * height), met = speed / kG;
+        for (double flight = 0.0; met + flight <= run.time(); flight = 2.0 * speed / kG) {
+          met += flight;
+          speed *= restitution;
+        }
+        const double then = run.time() - met;
+        const auto ball = run.body("Ball");
+        EXPECT_NEAR(ball.pose.position.y(), 0.01 + speed * then - 0.5 * kG * then * then, 1e-7)
+            << simulator << ' ' << restitution << ' ' << height;
+        EXPECT_NEAR(ball.twist.linear.y(), speed - kG * then, 1e-5) << simulator << ' ' << restitution << ' ' << height;
+      }
+}
+
 }  // namespace
 }  // namespace gravitas

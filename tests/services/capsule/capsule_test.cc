@@ -436,6 +436,35 @@ TEST(Capsule, ARefusalThatWasAnAnswerIsTheSame) {
   EXPECT_THAT(alike.out, HasSubstr(std::string(" answered alike") + kRefused + "\n"));
 }
 
+// A dense step of three bodies does not fit into the room that is offered first: derivatives are asked again with more.
+TEST(Capsule, AnAnswerThatTakesMoreRoomIsTheSame) {
+  const ScratchFolder folder;
+  std::string bodies;
+  for (int i = 1; i <= 3; ++i)
+    bodies += fmt::format(
+        "Body {{ Id = \"B{0}\" Mass = 1 PrincipalMoments = {{1, 1, 1}} KineticProperties {{ Position = {{{0}, 0, 0}} "
+        "}} "
+        "Forces = {{ \"Held\" }} }}\n",
+        i);
+  const std::string scene =
+      folder.write("springs.gravitas",
+                   "Forces { Force { Type = \"Spring\" Id = \"Held\" CustomProperties { Stiffness = 10 } } }\n"
+                   "Simulator { CustomProperties { TimeStep = 0.001 Duration = 0.003 } }\n"
+                   "Environment { Space { Bodies {\n" +
+                       bodies + "} }\nKineticIntegrator = \"DormandPrince54\" }\n");
+  for (const char* kept : {"shm", "grpc"}) {
+    const std::string file = folder.path("springs.capsule");
+    const ProgramResult captured =
+        run_program({"capture", scene, "--slot", "integrator", "--out", file, "--hosting", kept}, folder);
+    ASSERT_EQ(captured.exit_code, 0) << captured.err;
+    for (const char* asked : {"shm", "grpc", "direct"}) {
+      const ProgramResult again = run_program({"replay", file, "--hosting", asked}, folder);
+      EXPECT_EQ(again.exit_code, 0) << again.out;
+      EXPECT_THAT(again.out, HasSubstr("3 calls: 3 same, 0 different\n")) << kept << ", " << asked;
+    }
+  }
+}
+
 TEST(Capsule, BytesOfAnyKindAreReadWithoutHarm) {
   const ScratchFolder folder;
   const std::string file = capture("solver", folder);

@@ -268,19 +268,49 @@ TEST(Exchange, TheReportSaysWhatIsEnforcedOnEveryWorker) {
   EXPECT_EQ(open.report.plan().slots(0).sandbox_size(), 0);
 }
 
+// The solver of the sample as a worker of somebody's own.
+class OwnWorker {
+ public:
+  OwnWorker() {
+    const std::string command = in_shell(in_build("/bin/gravitas-worker")) + " --listen " + address_ + " " +
+                                in_shell(in_build("/lib/gravitas/solver_sequential.so")) + " >/dev/null 2>&1 & echo $!";
+    FILE* const shell = popen(command.c_str(), "r");
+    EXPECT_EQ(fscanf(shell, "%d", &process_), 1);
+    pclose(shell);
+    for (int i = 0; i < 500 && access(folder_.path("worker").c_str(), F_OK) != 0; ++i) usleep(10'000);
+  }
+  ~OwnWorker() {
+    if (process_ > 0) kill(process_, SIGKILL);
+  }
+  OwnWorker(const OwnWorker&) = delete;
+  OwnWorker& operator=(const OwnWorker&) = delete;
+
+  std::string solver() const { return "solver=" + address_; }
+
+ private:
+  const ScratchFolder folder_;
+  const std::string address_ = "unix:" + folder_.path("worker");
+  int process_ = 0;
+};
+
+// It serves one kernel at a time, and goes on with the edited scene.
+TEST(Exchange, AnAttachedWorkerAnswersAfterAnEdit) {
+  std::vector<std::string> words = {"--edit", "set Body.Ground.CanSleep=false@step=30", "--edit",
+                                    "set Body.Ground.CanSleep=true@step=40"};
+  const Outcome expected = run_sample(words);
+  ASSERT_EQ(expected.program.exit_code, 0) << expected.program.err;
+  const OwnWorker worker;
+  words.insert(words.end(), {"--attach", worker.solver()});
+  const Outcome run = run_sample(words);
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), expected.report.chain_hash());
+  EXPECT_EQ(run.report.faults_size(), 0);
+}
+
 // A worker of somebody's own, stopped for longer than any deadline.
 TEST(Exchange, AnAttachedWorkerHasNoDeadline) {
-  const ScratchFolder folder;
-  const std::string address = "unix:" + folder.path("worker");
-  const std::string command = in_shell(in_build("/bin/gravitas-worker")) + " --listen " + address + " " +
-                              in_shell(in_build("/lib/gravitas/solver_sequential.so")) + " >/dev/null 2>&1 & echo $!";
-  FILE* const shell = popen(command.c_str(), "r");
-  int process = 0;
-  ASSERT_EQ(fscanf(shell, "%d", &process), 1);
-  pclose(shell);
-  for (int i = 0; i < 500 && access(folder.path("worker").c_str(), F_OK) != 0; ++i) usleep(10'000);
-  const Outcome run = run_sample({"--attach", "solver=" + address, "--fault", "solver:slow,seconds=3@step=50"});
-  kill(process, SIGKILL);
+  const OwnWorker worker;
+  const Outcome run = run_sample({"--attach", worker.solver(), "--fault", "solver:slow,seconds=3@step=50"});
   ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
   EXPECT_EQ(run.report.chain_hash(), quiet_chain());
   EXPECT_EQ(run.report.faults_size(), 0);

@@ -231,6 +231,22 @@ Environment { Space { Bodies {
   EXPECT_EQ(report.warnings_size(), 0);
 }
 
+// Nor did what falls past the middle of another: the way out is on the other side then.
+TEST(Figures, WhatFallsThroughTheMiddleInTheFirstStepDoesNotOverlapAtTheStart) {
+  for (const char* shape : {R"(Type = "Sphere" CustomProperties { Radius = 0.0005 })",
+                            R"(Type = "Box" CustomProperties { HalfExtents = {0.1, 0.0005, 0.1} })"}) {
+    const report::v1::Report report =
+        figures_of(std::string("Geometries { Geometry { Id = \"Shape\" ") + shape + R"( } }
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { CustomProperties { TimeStep = 0.012 } }
+Environment { Space { Bodies {
+  Body { Id = "Held" GeometryId = "Shape" Immovable = true }
+  Body { Id = "Falls" GeometryId = "Shape" Mass = 1 KineticProperties { Position = {0, 0.001, 0} } Forces = { "Down" } } } } })",
+                   1);
+    EXPECT_EQ(report.warnings_size(), 0) << shape << ": " << report.warnings(0);
+  }
+}
+
 // A rod that turns its end to the floor in the first step began above it.
 TEST(Figures, WhatTurnsDownInTheFirstStepDoesNotOverlapAtTheStart) {
   for (const char* simulator : {"Basic", "Substepping"}) {
