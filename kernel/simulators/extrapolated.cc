@@ -18,15 +18,13 @@ namespace {
 
 constexpr double kFinestPart = 1e-10;  // of the step
 constexpr double kCrumb = 1e-3, kCoarser = 1.02, kShorter = 0.25, kLonger = 4.0;
-// What the start misses of its laws within the accuracy is put right in the first inner step. s
-constexpr double kOfJump = 0.125;
+constexpr double kOfJump = 0.125;  // s; what the start misses within the accuracy is put right in the first inner step
 constexpr double kSeesJumps = 1e-10;  // accuracies below are less than rounding, which looks like jumps of reactions
 constexpr double kOfAccuracy = 1e-3, kNothing = 1e-12;  // m, m/s or rad/s: changes that count for none
-constexpr double kStill = 1e-15;                        // of the trial velocity
-constexpr double kConverges = 0.5;                      // share of the error that a piece more leaves, at most
-// Attempts up to which errors are not compared: where the coarsest is off for the start alone (extrapolation.h) the estimate of three
-// has half of what that of two has, however short the part is. That of four may leave it out.
-constexpr std::uint32_t kNotCompared = 3;
+constexpr double kStill = 1e-15,
+                 kConverges = 0.5;  // of the trial velocity; of the error that a piece more leaves, at most
+// Attempts of which errors are not compared: where the coarsest is off for the start alone (extrapolation.h) three have half of two's.
+constexpr std::uint32_t kFew = 3;
 constexpr double kSettled = 0.01;  // share of the accuracy: lesser errors need not converge while jumps are looked at
 
 // The numbers of a state; attitudes q, which are the same as -q, on the side of those at the start.
@@ -112,8 +110,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       if (std::max(now, jumps_.least_size()) <= description_.accuracy && pieces > first) enough = pieces;
       if (enough > 0 && of_jump > 0.0 && breaks_away(begin + length, length, pieces)) return go_back(), 0;
       go_back();
-      const bool converges =
-          pieces <= kNotCompared || now <= std::max(kConverges * error, kSettled * description_.accuracy);
+      const bool converges = pieces <= kFew || now <= std::max(kConverges * error, kSettled * description_.accuracy);
       error = now;
       if (!converges) break;
     }
