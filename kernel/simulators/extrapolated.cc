@@ -21,8 +21,7 @@ constexpr double kCrumb = 1e-3, kCoarser = 1.02, kShorter = 0.25, kLonger = 4.0;
 constexpr double kOfJump = 0.125;  // s; what the start misses within the accuracy is put right in the first inner step
 constexpr double kSeesJumps = 1e-10;  // accuracies below are less than rounding, which looks like jumps of reactions
 constexpr double kOfAccuracy = 1e-3, kNothing = 1e-12;  // m, m/s or rad/s: changes that count for none
-constexpr double kStill = 1e-15,
-                 kConverges = 0.5;  // of the trial velocity; of the error that a piece more leaves, at most
+constexpr double kStill = 1e-15, kConverges = 0.5;      // of the trial velocity; of the error that a piece more leaves
 // Attempts of which errors are not compared: where the coarsest is off for the start alone (extrapolation.h) three have half of two's.
 constexpr std::uint32_t kFew = 3;
 constexpr double kSettled = 0.01;  // share of the accuracy: lesser errors need not converge while jumps are looked at
