@@ -245,7 +245,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   void find_stops(bool of_trial, std::vector<StopGap>* stops) const;
   void note_what_joints_bear();                                         // openings.cc
   Trusted<TrialState> integrate_shorter(double begin, double* length);  // openings.cc
-  double length_of_flight(double begin, double length);                 // of a stop that opens and is pressed again
+  Trusted<TrialState> end_at_opening(Trusted<TrialState> trial, double begin, double* length);
+  double length_of_flight(double begin, double length);  // of a stop that opens and is pressed again
   // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
   std::uint64_t most_reaction_blocks() const;
 
@@ -409,18 +410,17 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities
   std::vector<double> start_gaps_, trial_gaps_;                                       // of limits
   std::vector<StopGap> first_stops_, start_stops_, end_stops_, trial_stops_;
-  std::vector<double> borne_, least_borne_;  // N, by joints in the last, and of all derivatives of S* (Smooth)
-  std::vector<double> start_impulse_;        // N s, of joints, where the step begins (Smooth)
+  std::vector<double> borne_, first_borne_, least_borne_;  // N, by joints in the last, first, all derivatives of S*
+  std::vector<double> start_impulse_;                      // N s, of joints, where the step begins (Smooth)
   std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;  // pairs
   double margin_ = 0.0;
 
   Activity activity_;
-  std::uint32_t sleepers_ = 0;               // in this step
-  bool is_idle_ = false;                     // nothing moved in the last step, and nothing has come up since
-  std::vector<std::uint32_t> wake_orders_;   // with the next step
-  std::vector<std::uint32_t> pushed_;        // asleep, under another force than before
-  std::vector<std::uint32_t> joint_bodies_;  // scratch of connections()
-  std::vector<MergedRow> merged_;            // scratch
+  std::uint32_t sleepers_ = 0;                       // in this step
+  bool is_idle_ = false;                             // nothing moved in the last step, and nothing has come up since
+  std::vector<std::uint32_t> wake_orders_, pushed_;  // with the next step; asleep, under another force than before
+  std::vector<std::uint32_t> joint_bodies_;          // scratch of connections()
+  std::vector<MergedRow> merged_;                    // scratch
 
   StageSlot space_, collision_, constraint_, force_, solver_, integrator_;
   const std::array<StageSlot*, 6> slots_ = {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_};

@@ -1,4 +1,5 @@
-// What the searches for impacts and jumps share (located.cc, halving.cc, jumps.cc, breakaways.cc, limits.cc), and who keeps the pairs that touch (gaps.cc).
+// What the searches for impacts and jumps share (located.cc, halving.cc, jumps.cc, breakaways.cc, limits.cc), who keeps the pairs that
+// touch (gaps.cc), and which limits may open (openings.cc, smooth.cc).
 #pragma once
 
 #include <algorithm>
@@ -30,6 +31,12 @@ inline Vector3 contact_velocity(const StepData& data, std::size_t contact, const
     return Vector3(vector_at(linear.span(), body) + vector_at(angular.span(), body).cross(arm));
   };
   return velocity(data.contact_body[2 * contact + 1]) - velocity(data.contact_body[2 * contact]);
+}
+
+// Is this axis (three a row) of a joint a limit that leaves it room?
+inline bool may_open(const DiscrepancyAnswer& joints, std::size_t i) {
+  const AxisMode mode = axis_mode(joints.mode[i / 3], static_cast<int>(i % 3));
+  return mode == AxisMode::kUnilateral || (mode == AxisMode::kLimited && joints.lower[i] < joints.upper[i]);
 }
 
 // turns.cc: what two bodies overlap by no more than this is pushed out on the side where it came in, m.

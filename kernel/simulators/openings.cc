@@ -1,4 +1,7 @@
-// Stops of joints that open within an inner step of `Smooth`, and are pressed again within it.
+// Limits of joints that open within an inner step of `Smooth`, and stops that are pressed again within it.
+//
+// Where a limit opens its force, which fell to zero, stays there: a kink, which costs a method its order. So an inner step ends just
+// behind it. What the limit bears while it holds tells where: the secant of the last two trials that hold leads to it.
 //
 // Reactions go by what was closed where an inner step begins. What a stop let go of and comes back to it within the same inner
 // step goes on into it, and would be put out of it at the end, against whatever presses there; and what presses while it flies off,
@@ -7,23 +10,39 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "kernel/environment.h"
+#include "kernel/simulators/location.h"
 
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kMostFlightLooks = 24, kMostHalvings = 10;
-constexpr double kFlightShare = 1.0 / 64;  // of the length, to which it is known where the flight begins
+constexpr int kMostOpeningLooks = 40, kMostFlightLooks = 24, kMostHalvings = 10, kHalvedLooks = 4;
+// Of the length, to which it is known where a limit opens (what that is off by counts with its square), where a flight begins.
+constexpr double kOpeningShare = 1e-6, kFlightShare = 1.0 / 64;
+constexpr double kNearEnd =
+    0.75;  // of the length: an integrator that asks for nothing behind it does not see what opens there
+
+// Where the first limit bears no more, at most `latest`, by the secant of what joints bore in trials of these two lengths.
+double zero_of_limits(const StepData& data, std::span<const double> borne, double held, double tried, double latest) {
+  double zero = latest;
+  for (std::size_t i = 0; i < borne.size(); ++i) {
+    const double bears = std::abs(data.held_force[i]), falls = (std::abs(borne[i]) - bears) / (tried - held);
+    if (falls > 0.0 && may_open(data.discrepancies, i)) zero = std::min(zero, tried + bears / falls);
+  }
+  return zero;
+}
 
 }  // namespace
 
 void Environment::note_what_joints_bear() {
   data_.held_force.assign(data_.discrepancy_force);
   const bool is_first = least_borne_.size() != data_.held_force.size();
+  if (is_first) first_borne_.assign(data_.held_force.span().begin(), data_.held_force.span().end());
   if (is_first) least_borne_.resize(data_.held_force.size());
   for (std::size_t i = 0; i < least_borne_.size(); ++i) {
     const double borne = std::abs(data_.held_force[i]);
@@ -47,6 +66,36 @@ Trusted<TrialState> Environment::integrate_shorter(double begin, double* length)
 std::string Environment::why_shortened(std::uint32_t times, std::uint32_t step) {
   return "from step " + std::to_string(step) + " on the integrator refused trials of whole steps (" +
          std::to_string(times) + " in all), which were made in shorter ones";
+}
+
+// The trial, which is in S*, or a shorter one that ends just behind where the first limit opens which bears at its beginning.
+Trusted<TrialState> Environment::end_at_opening(Trusted<TrialState> trial, double begin, double* length) {
+  const auto opens = [&] {
+    for (std::size_t i = 0; i < least_borne_.size(); ++i)
+      if (first_borne_[i] != 0.0 && least_borne_[i] == 0.0 && may_open(data_.discrepancies, i)) return true;
+    return false;
+  };
+  if (!opens() || data_.derivative_time[0] - data_.time[0] < kNearEnd * *length) return trial;
+  const double finest = kOpeningShare * *length;
+  double holds = 0.0, known = 0.0, open = *length, zero = open, next = 0.5 * open;
+  borne_ = first_borne_;
+  for (int i = 1; i <= kMostOpeningLooks && open - known > finest; ++i) {
+    double tried =
+        i % kHalvedLooks == 0 ? 0.5 * (holds + open) : std::clamp(next, holds + 0.5 * finest, open - 0.5 * finest);
+    trial = integrate_shorter(begin, &tried);
+    if (opens()) {
+      open = tried, next = 0.5 * (holds + open);
+    } else {
+      // from below, until zeros agree
+      const double before = std::exchange(zero, zero_of_limits(data_, borne_, holds, tried, open));
+      const double off = std::abs(zero - before);
+      holds = tried, known = off <= finest ? std::max(holds, zero) : holds;
+      next = off <= finest ? zero + 0.5 * finest : zero - 0.25 * off;
+      borne_.assign(data_.held_force.span().begin(), data_.held_force.span().end());
+    }
+  }
+  *length = open;
+  return data_.time_step[0] == open ? std::move(trial) : integrate_shorter(begin, length);
 }
 
 // Where stops are pressed again in S*: how long an inner step is that ends while they are open. In end_stops_ are the stops where it

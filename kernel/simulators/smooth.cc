@@ -14,6 +14,7 @@
 #include <cmath>
 
 #include "kernel/environment.h"
+#include "kernel/simulators/location.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/joint_locks.h"
 #include "plugin_sdk/wrench_jacobian.h"
@@ -69,14 +70,11 @@ void Environment::ask_reactions() {
 // right, too. That is a small share of what it pushed in the step: where it would pull by more, it opens.
 bool Environment::lets_go_of_limits() {
   constexpr double kOfPush = 1e-3;
-  const DiscrepancyAnswer& joints = data_.discrepancies;
   bool any = false;
   for (std::size_t i = 0; i < data_.discrepancy_impulse.size(); ++i) {
-    const AxisMode mode = axis_mode(joints.mode[i / 3], static_cast<int>(i % 3));
-    const bool may_open =
-        mode == AxisMode::kUnilateral || (mode == AxisMode::kLimited && joints.lower[i] < joints.upper[i]);
     const double push = data_.held_force[i] * data_.time_step[0], impulse = data_.discrepancy_impulse[i];
-    if (!may_open || push * impulse >= 0.0 || std::abs(impulse) <= kOfPush * std::abs(push)) continue;
+    if (!may_open(data_.discrepancies, i) || push * impulse >= 0.0 || std::abs(impulse) <= kOfPush * std::abs(push))
+      continue;
     data_.held_force[i] = 0.0;
     any = true;
   }

@@ -19,6 +19,7 @@ using harness::SceneRun;
 using harness::set;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Matches;
 
 // Links of 0.2 m in a row from the world on, joined by balls with these limits. `motion`: what a link has beside its place, whose
 // middle is so far from the world.
@@ -174,6 +175,7 @@ TEST(ChainOfCones, GoesOnAtALongStep) {
     double cone, speed;
     Vector3 moments;
   };
+  bool is_refused = false;
   for (const Chain& chain : {Chain{3, 0.05, 10.0, ball}, Chain{4, 0.2, 10.0, rod}}) {
     SceneRun run(whip(chain.links, "ReachConeAngle = " + literal(chain.cone), chain.speed, chain.moments),
                  {set("Simulator", "Smooth"), set("Simulator.TimeStep", 1.0 / 30.0), set("Simulator.Duration", 0.1),
@@ -192,9 +194,11 @@ TEST(ChainOfCones, GoesOnAtALongStep) {
       }
     }
     EXPECT_LE(run.report().max_joint_error(), 1e-9) << chain.links;
-    EXPECT_THAT(run.environment().warnings(), Contains(HasSubstr("the integrator refused trials of whole steps")));
+    is_refused = is_refused || Matches(Contains(HasSubstr("the integrator refused trials of whole steps")))(
+                                   run.environment().warnings());
     EXPECT_EQ(run.report().faults_size(), 0) << "an answer that less of the step can be made is no fault";
   }
+  EXPECT_TRUE(is_refused) << "no trial is shortened any more: take other chains";
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // `Smooth` ends its inner steps where stops are met: what bounces there keeps its energy, and motion the integrator's order.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -109,6 +110,46 @@ TEST(StopsOfSmooth, LeaveAPreloadedSuspensionItsOrder) {
   EXPECT_LT(coarse, 2e-5);
   EXPECT_NEAR(std::log2(coarse / fine), 4.0, 0.4);
   EXPECT_NEAR(std::log2(fine / finest), 4.0, 0.4);
+}
+
+// Pressed on its stop by a force that falls evenly and turns at 1/3 s, a sprung slider leaves it: x = a (t - sin(rate t)/rate).
+TEST(StopsOfSmooth, LeaveMotionItsOrderWhereTheyOpen) {
+  const double rate = std::sqrt(5.0 / 2.0), since = 0.96 - 1.0 / 3.0;
+  const auto error = [&](double h, const char* integrator) {
+    SceneRun run(scene(
+        "Force { Type = \"Basic\" Id = \"Push\" CustomProperties { Table = {{0, {-3, 0, 0}}, {1, {6, 0, 0}}} } }",
+        ball({0, 0, 0}, {0, 0, 0}, "\"Push\""),
+        "Constraint { Type = \"Slider\" Id = \"Rail\" Body2 = \"A\" CustomProperties { BindPoint = {0, 0, 0} Axis = "
+        "{1, 0, 0} LowerLimit = 0 Stiffness = 5 RestPosition = 0 } }",
+        h, 0.96, integrator));
+    run.to_end();
+    return std::max(std::fabs(run.body("A").pose.position.x() - 1.8 * (since - std::sin(rate * since) / rate)),
+                    std::fabs(run.body("A").twist.linear.x() - 1.8 * (1.0 - std::cos(rate * since))));
+  };
+  const double coarse = error(0.04, "RK4"), fine = error(0.02, "RK4"), finest = error(0.01, "RK4");
+  EXPECT_NEAR(std::log2(coarse / fine), 4.0, 0.4);
+  EXPECT_NEAR(std::log2(fine / finest), 4.0, 0.4);
+  EXPECT_LT(error(0.04, "DormandPrince54"), 2e-9);
+  EXPECT_LT(error(0.04, "DormandPrince853"), 2e-9);
+}
+
+// Swung up on a rope of 1 m at v^2 = 7/2 g, a body leaves the circle 30 degrees above its centre, where v^2 = g/2: it flies on level.
+TEST(StopsOfSmooth, LeaveMotionItsOrderWhereARopeGoesSlack) {
+  const auto error = [&](double h, const char* integrator) {
+    SceneRun run(
+        scene(kDown, ball({-1, 0, 0}, {0, std::sqrt(3.5 * kG), 0}, "\"Down\""),
+              "Constraint { Type = \"Distance\" Id = \"Rope\" Body2 = \"A\" CustomProperties { BindPoint1 = {0, 0, 0} "
+              "BindPoint2 = {-1, 0, 0} MaximumDistance = 1 } }",
+              h, 0.72, integrator));
+    run.to_end();
+    EXPECT_LT(run.body("A").pose.position.norm(), 0.99);
+    return std::fabs(run.body("A").twist.linear.y() + 0.5 * std::sqrt(0.5 * kG));
+  };
+  EXPECT_LT(error(0.01, "RK4"), 2e-7);
+  EXPECT_LT(error(0.005, "RK4"), 2e-8);
+  EXPECT_LT(error(0.0025, "RK4"), 2e-9);
+  EXPECT_LT(error(0.02, "DormandPrince54"), 5e-9);
+  EXPECT_LT(error(0.02, "DormandPrince853"), 1e-9);
 }
 
 // e = 1/2 on a load: it comes to rest after sqrt(2 h/g) (1 + e)/(1 - e), and rests.
