@@ -407,6 +407,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   Extrapolation extrapolation_, jumps_;
   static constexpr std::uint32_t kMostPieces = 8;                                     // of a part that is extrapolated
   std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities
+  std::vector<double> first_impulses_, guess_;                                        // of contacts, per s (jumps.cc)
   std::vector<double> start_gaps_, trial_gaps_;                                       // of limits
   std::vector<StopGap> first_stops_, start_stops_, end_stops_, trial_stops_;
   std::vector<double> borne_, least_borne_;  // N, by joints in the last, and of all derivatives of S* (Smooth)

@@ -76,7 +76,8 @@ bool Environment::breaks_away(double end, double length, std::uint32_t pieces) {
                 !vector_at(data_.contact_turning.span(), i).isZero(0.0);
   }
   if (!any_bears) return false;
-  if (!make_piece(end, length, 0, pieces) || must_restart_) return true;
+  begin_inner_step(end, length / pieces);
+  if (!make_next_state() || must_restart_) return true;
   find_changes(&trial_changes_);
   if (lets_go()) return false;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {

@@ -52,6 +52,7 @@ void Environment::extrapolate_parts(double begin, double length) {
   bool has_failed = false;
   while (done < length && !must_restart_) {
     const double from = begin + done, left = length - done;
+    first_impulses_.clear();
     NextStop stop{std::min(wanted, left)};
     if (has_contacts()) {
       begin_inner_step(from, stop.length);
@@ -100,6 +101,11 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       for (std::uint32_t i = 0; i < pieces; ++i) {
         if (!make_piece(begin, length, i, pieces) || must_restart_) return go_back(), 0;
         if (commit_listener_ != nullptr) commit_listener_->on_attempt(data_, pieces);
+        if (i == 0) {
+          first_impulses_.clear();
+          for (const double impulse : data_.contact_impulse.span())
+            first_impulses_.push_back(impulse / data_.time_step[0]);
+        }
         if (i == 0) put_changes(&first_changes_[pieces - 1]), pressed_by_attempts_ = pressed_;
         if (i + 1 == pieces && !ends_with_impact) put_changes(&trial_changes_);
         const std::size_t before = front_;
