@@ -135,11 +135,6 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
     if (!vector_at(data_.contact_warm_impulse.span(), i).isZero(0.0))
       data_.contact_material[kMaterialColumns * i + kRestitution] = 0.0;
-  // of attempts at a part, and of trials (jumps.cc)
-  const bool has_guess = guess_.size() == data_.contact_warm_impulse.size();
-  for (std::size_t k = 0; k < guess_.size() && has_guess; ++k)
-    if (data_.contact_warm_impulse[k] != 0.0 && guess_[k] != 0.0)
-      data_.contact_warm_impulse[k] = data_.time_step[0] * guess_[k];
   std::optional<Trusted<Solution>> solution = solve();
   if (knows_reactions()) {
     // S* was integrated with what lets go

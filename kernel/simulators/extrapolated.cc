@@ -21,9 +21,7 @@ constexpr double kCrumb = 1e-3, kCoarser = 1.02, kShorter = 0.25, kLonger = 4.0;
 // What the start misses of its laws within the accuracy is put right in the first inner step. s
 constexpr double kOfJump = 0.125;
 constexpr double kSeesJumps = 1e-10;  // accuracies below are less than rounding, which looks like jumps of reactions
-constexpr double kOfAccuracy = 1e-3, kNothing = 1e-12;  // m, m/s or rad/s: changes that count for none
-constexpr double kStill = 1e-15;                        // of the trial velocity
-constexpr double kConverges = 0.5;                      // share of the error that a piece more leaves, at most
+constexpr double kConverges = 0.5;    // share of the error that a piece more leaves, at most
 // Attempts up to which errors are not compared: where the coarsest is off for the start alone (extrapolation.h) the estimate of three
 // has half of what that of two has, however short the part is. That of four may leave it out.
 constexpr std::uint32_t kNotCompared = 3;
@@ -130,31 +128,6 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
     throw;
   }
   return enough;
-}
-
-// Of bodies that it moves. Other numbers stay: a difference of rounding alone would double from part to part. What reactions leave
-// of a velocity within rounding is none: what rests rests. Returns the weights of the attempts.
-std::span<const double> Environment::take_extrapolated() {
-  const State& end = back();
-  const double nothing = std::min(kOfAccuracy * description_.accuracy, kNothing);
-  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    if (!is_awake(i)) continue;
-    const double* best = &extrapolation_.best()[kExtrapolated * i];
-    set_quaternion(end.orientation.span(), i, Quaternion(best[0], best[1], best[2], best[3]).normalized());
-    const auto set = [&](const Column<double>& column, const Column<double>& trial, std::size_t at) {
-      for (std::size_t k = 3ULL * i; k < 3ULL * i + 3; ++k, ++at) {
-        if (std::fabs(best[at] - column[k]) > nothing) column[k] = best[at] + 0.0;
-        if (std::fabs(column[k]) <= kStill * std::fabs(trial[k])) column[k] = 0.0;
-      }
-    };
-    set(end.position, data_.trial_position, 4);
-    set(end.linear_velocity, data_.trial_linear_velocity, 7);
-    set(end.angular_velocity, data_.trial_angular_velocity, 10);
-    end.state_changed[i] = 1;
-  }
-  figures_ = {};
-  complete_state();
-  return extrapolation_.weights();
 }
 
 }  // namespace gravitas::kernel
