@@ -408,6 +408,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   Extrapolation extrapolation_, jumps_;
   static constexpr std::uint32_t kMostPieces = 8;                                     // of a part that is extrapolated
   std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities
+  std::vector<double> first_impulses_, guess_;                                        // of contacts, per s (jumps.cc)
   std::vector<double> start_gaps_, trial_gaps_;                                       // of limits
   std::vector<StopGap> first_stops_, start_stops_, end_stops_, trial_stops_;
   std::vector<double> borne_, first_borne_, least_borne_;  // N, by joints in the last, first, all derivatives of S*

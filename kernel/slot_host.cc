@@ -201,11 +201,11 @@ Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* po
   }
 }
 
-void SlotHost::cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description) {
+void SlotHost::cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description, bool is_final) {
   end_probation();
-  old_ = std::exchange(carrier_, std::move(carrier));
-  swapped_ = slot;
+  old_ = std::exchange(carrier_, std::move(carrier)), swapped_ = slot;
   previous_.insert_or_assign(slot, description_);
+  if (is_final) end_probation(), previous_.erase(slot);
   replace_description(std::move(description));
 }
 

@@ -74,8 +74,8 @@ class SlotHost {
 
   // A host for a swap, in preparation.
   std::unique_ptr<Spare> prepare(const SlotDescription& description) const;
-  // Lets `carrier`, with another plugin of the slot, answer from now on; the old one stays warm until end_probation().
-  void cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description);
+  // Lets `carrier`, with another plugin of the slot, answer from now on; the old one stays warm until end_probation(), or is gone.
+  void cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description, bool is_final);
   // Why the slot's fallbacks could not be held; empty if they could.
   std::string why_no_fallback(Slot slot) const { return why_apart(after_fallback(slot).plugins); }
   bool is_on_probation() const { return old_ != nullptr; }

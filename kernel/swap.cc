@@ -78,8 +78,9 @@ void StageSlot::prepare_swaps() {
     const SlotDescription& now = hosts_[swap.host]->description();
     const std::uint32_t row = routes_[swap.target].target;
     swap.next = now;
-    swap.next.plugins[row] = swap.order.plugin;
-    swap.next.plugins[row].fallback = now.plugins[row].fallback;
+    PluginChoice& next = swap.next.plugins[row] = swap.order.plugin;
+    next.fallback = now.plugins[row].fallback;
+    if (swap.order.is_final && next.fallback && is_same_plugin(*next.fallback, next)) next.fallback = nullptr;
     if (swap.order.hosting) swap.next.hosting = *swap.order.hosting;
     if (swap.order.plugin.is_elsewhere()) swap.next.hosting = Hosting::kGrpc;
     swap.next.end_attachment();
@@ -161,12 +162,10 @@ void StageSlot::cut_over(PendingSwap* swap) {
   SlotHost& host = *hosts_[swap->host];
   if (host.is_on_probation()) close_all_probations(&host, SwapState::kCommitted, {});
   SwapRecord& record = swaps_[swap->record];
-  record.state = SwapState::kProbation;
-  record.step = step_;
-  swap->is_in_shadow = false;
-  record.shadow = swap->shadow.result();
-  host.cut_over(which_, std::move(swap->candidate), std::move(swap->next));
-  probation_.push_back({&host, swap->record});
+  record.state = swap->order.is_final ? SwapState::kCommitted : SwapState::kProbation, record.step = step_;
+  swap->is_in_shadow = false, record.shadow = swap->shadow.result();
+  host.cut_over(which_, std::move(swap->candidate), std::move(swap->next), swap->order.is_final);
+  if (!swap->order.is_final) probation_.push_back({&host, swap->record});
   // who comes in is asked already: a comparison that is lost in that would be taken out from under this swap
   is_watched_ = false;
   let_all_adopt(host, "swap", swap->target);

@@ -20,10 +20,10 @@ constexpr double kFinestPart = 1e-10;  // of the step
 constexpr double kCrumb = 1e-3, kCoarser = 1.02, kShorter = 0.25, kLonger = 4.0;
 constexpr double kOfJump = 0.125;  // s; what the start misses within the accuracy is put right in the first inner step
 constexpr double kSeesJumps = 1e-10;  // accuracies below are less than rounding, which looks like jumps of reactions
-constexpr double kOfAccuracy = 1e-3, kNothing = 1e-12;  // m, m/s or rad/s: changes that count for none
-constexpr double kStill = 1e-15, kConverges = 0.5;      // of the trial velocity; of the error that a piece more leaves
-// Attempts of which errors are not compared: where the coarsest is off for the start alone (extrapolation.h) three have half of two's.
-constexpr std::uint32_t kFew = 3;
+constexpr double kConverges = 0.5;    // share of the error that a piece more leaves, at most
+// Attempts up to which errors are not compared: where the coarsest is off for the start alone (extrapolation.h) the estimate of three
+// has half of what that of two has, however short the part is. That of four may leave it out.
+constexpr std::uint32_t kNotCompared = 3;
 constexpr double kSettled = 0.01;  // share of the accuracy: lesser errors need not converge while jumps are looked at
 
 // The numbers of a state; attitudes q, which are the same as -q, on the side of those at the start.
@@ -49,6 +49,7 @@ void Environment::extrapolate_parts(double begin, double length) {
   bool has_failed = false;
   while (done < length && !must_restart_) {
     const double from = begin + done, left = length - done;
+    first_impulses_.clear();
     NextStop stop{std::min(wanted, left)};
     if (has_contacts()) {
       begin_inner_step(from, stop.length);
@@ -97,6 +98,11 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       for (std::uint32_t i = 0; i < pieces; ++i) {
         if (!make_piece(begin, length, i, pieces) || must_restart_) return go_back(), 0;
         if (commit_listener_ != nullptr) commit_listener_->on_attempt(data_, pieces);
+        if (i == 0) {
+          first_impulses_.clear();
+          for (const double impulse : data_.contact_impulse.span())
+            first_impulses_.push_back(impulse / data_.time_step[0]);
+        }
         if (i == 0) put_changes(&first_changes_[pieces - 1]), pressed_by_attempts_ = pressed_;
         if (i + 1 == pieces && !ends_with_impact) put_changes(&trial_changes_);
         const std::size_t before = front_;
@@ -109,7 +115,8 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       if (std::max(now, jumps_.least_size()) <= description_.accuracy && pieces > first) enough = pieces;
       if (enough > 0 && of_jump > 0.0 && breaks_away(begin + length, length, pieces)) return go_back(), 0;
       go_back();
-      const bool converges = pieces <= kFew || now <= std::max(kConverges * error, kSettled * description_.accuracy);
+      const bool converges =
+          pieces <= kNotCompared || now <= std::max(kConverges * error, kSettled * description_.accuracy);
       error = now;
       if (!converges) break;
     }
@@ -120,31 +127,6 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
     throw;
   }
   return enough;
-}
-
-// Of bodies that it moves. Other numbers stay: a difference of rounding alone would double from part to part. What reactions leave
-// of a velocity within rounding is none: what rests rests. Returns the weights of the attempts.
-std::span<const double> Environment::take_extrapolated() {
-  const State& end = back();
-  const double nothing = std::min(kOfAccuracy * description_.accuracy, kNothing);
-  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    if (!is_awake(i)) continue;
-    const double* best = &extrapolation_.best()[kExtrapolated * i];
-    set_quaternion(end.orientation.span(), i, Quaternion(best[0], best[1], best[2], best[3]).normalized());
-    const auto set = [&](const Column<double>& column, const Column<double>& trial, std::size_t at) {
-      for (std::size_t k = 3ULL * i; k < 3ULL * i + 3; ++k, ++at) {
-        if (std::fabs(best[at] - column[k]) > nothing) column[k] = best[at] + 0.0;
-        if (std::fabs(column[k]) <= kStill * std::fabs(trial[k])) column[k] = 0.0;
-      }
-    };
-    set(end.position, data_.trial_position, 4);
-    set(end.linear_velocity, data_.trial_linear_velocity, 7);
-    set(end.angular_velocity, data_.trial_angular_velocity, 10);
-    end.state_changed[i] = 1;
-  }
-  figures_ = {};
-  complete_state();
-  return extrapolation_.weights();
 }
 
 }  // namespace gravitas::kernel

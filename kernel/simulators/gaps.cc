@@ -1,6 +1,7 @@
 // How far apart two surfaces that meet in a trial are in another state, and which pairs touch where an inner step ends.
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "kernel/environment.h"
 #include "kernel/simulators/location.h"
@@ -14,18 +15,45 @@ namespace {
 // located, a step that ends just before one touches nothing.
 constexpr double kTouchingShare = 1e-3, kLocatedShare = 1e-7;
 
+// From the surface point of a contact's first body to that of its second, where they are in another state.
+Vector3 between_surfaces(const StepData& data, std::size_t contact, const State& state) {
+  const Vector3 point = vector_at(data.contact_point.span(), contact);
+  const Vector3 normal = vector_at(data.contact_normal.span(), contact);
+  const Vector3 half = 0.5 * data.contact_depth[contact] * normal;
+  const auto carry = [&](const Vector3& from, std::uint32_t body) {
+    return carried(from,
+                   {vector_at(data.trial_position.span(), body), quaternion_at(data.trial_orientation.span(), body)},
+                   {vector_at(state.position.span(), body), quaternion_at(state.orientation.span(), body)});
+  };
+  return carry(point - half, data.contact_body[2 * contact + 1]) - carry(point + half, data.contact_body[2 * contact]);
+}
+
+// Of a body's extent along the normal, at most.
+double half_width(const LocalBound& bound, const Quaternion& orientation, const Vector3& normal) {
+  if (bound.reach == 0.0) return std::numeric_limits<double>::infinity();
+  if (bound.kind != BoundKind::kBox) return bound.reach;
+  const Quaternion box = orientation * bound.orientation;
+  return std::min(bound.reach, (box.conjugate() * normal).cwiseAbs().dot(bound.half_extents));
+}
+
 }  // namespace
 
-double Environment::gap_at(std::size_t contact, const State& state) const {
-  const Vector3 point = vector_at(data_.contact_point.span(), contact);
-  const Vector3 normal = vector_at(data_.contact_normal.span(), contact);
-  const Vector3 half = 0.5 * data_.contact_depth[contact] * normal;
-  const auto carry = [&](const Vector3& from, std::uint32_t body) {
-    return carried(from, pose_of(data_.trial_position, data_.trial_orientation, body),
-                   pose_of(state.position, state.orientation, body));
+double start_overlap(const StepData& data, std::size_t contact, const State& start, const LocalBound& one,
+                     const LocalBound& two) {
+  const Vector3 normal = vector_at(data.contact_normal.span(), contact);
+  const Vector3 apart = between_surfaces(data, contact, start);
+  const double depth = -normal.dot(apart);
+  // points that have come from elsewhere tell nothing
+  if (!((apart + depth * normal).norm() <= depth)) return 0.0;
+  // nor does a way out that is the longer of the two: the step has led through the middle
+  const auto width = [&](const LocalBound& bound, std::size_t side) {
+    return half_width(bound, quaternion_at(start.orientation.span(), data.contact_body[2 * contact + side]), normal);
   };
-  return normal.dot(carry(point - half, data_.contact_body[2 * contact + 1]) -
-                    carry(point + half, data_.contact_body[2 * contact]));
+  return depth > width(one, 0) + width(two, 1) ? 0.0 : depth;
+}
+
+double Environment::gap_at(std::size_t contact, const State& state) const {
+  return vector_at(data_.contact_normal.span(), contact).dot(between_surfaces(data_, contact, state));
 }
 
 // Overlap of every contact at S_{n+1}, in the first step and after an edit where it begins, too, and the pairs that touch.
@@ -41,7 +69,8 @@ void Environment::find_touching() {
     const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
     const double gap = gap_at(i, back());
     const bool begins = is_anew_ && inner_ == 0 && data_.contact_depth[i] > 0.0;
-    if (begins) start_overlap_ = std::max(start_overlap_, -gap_at(i, front()));
+    if (begins)
+      start_overlap_ = std::max(start_overlap_, start_overlap(data_, i, front(), model_.bound[a], model_.bound[b]));
     figures_.penetration = std::max(figures_.penetration, -gap);
     const bool touched_before = starts_with(data_.contact_body.span().subspan(2 * i, 2), &touched);
     // what touched, and opened no further in a very short inner step, is no flight

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kernel/simulators/location.h"
 #include "plugin_sdk/counted.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/property_value.h"
@@ -151,40 +152,19 @@ void Figures::measure(kernel::Environment* environment) {
   joined_size_ = joined.size(), scene_size_ = all.size();
 }
 
-// What contacts of the first inner step say of the poses that it begins with: where their points were in them.
+// What contacts of the first inner step say of the poses that it begins with.
 void Figures::find_overlaps(const kernel::InnerStep& inner) {
   const kernel::StepData& data = inner.data;
   const auto size = [&](std::uint32_t body) {
     const kernel::BodyDescription& of = description_.bodies[body];
     return of.mass > 0.0 ? std::sqrt(of.inertia.maxCoeff() / of.mass) : HUGE_VAL;
   };
-  const auto before = [&](std::uint32_t body, const Vector3& point) {
-    const Vector3 from = vector_at(data.trial_position.span(), body),
-                  to = vector_at(inner.before.position.span(), body);
-    const Quaternion turn = quaternion_at(inner.before.orientation.span(), body) *
-                            quaternion_at(data.trial_orientation.span(), body).conjugate();
-    return Vector3(to + turn * (point - from));
-  };
-  // of the body's extent along the normal, at most
-  const auto half_width = [&](std::uint32_t body, const Vector3& normal) {
-    const LocalBound& bound = description_.bodies[body].bound;
-    if (bound.reach == 0.0) return HUGE_VAL;
-    if (bound.kind != BoundKind::kBox) return bound.reach;
-    const Quaternion box = quaternion_at(inner.before.orientation.span(), body) * bound.orientation;
-    return std::min(bound.reach, (box.conjugate() * normal).cwiseAbs().dot(bound.half_extents));
-  };
   std::uint32_t last_one = kNone, last_two = kNone;
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < data.contact_depth.size(); ++i) {
     const std::uint32_t one = data.contact_body[2 * i], two = data.contact_body[2 * i + 1];
-    const Vector3 normal = vector_at(data.contact_normal.span(), i), point = vector_at(data.contact_point.span(), i);
-    const Vector3 half = 0.5 * data.contact_depth[i] * normal;
-    const Vector3 apart = before(one, point + half) - before(two, point - half);
-    const double depth = normal.dot(apart);
-    // points that have come from elsewhere tell nothing
-    if ((apart - depth * normal).norm() > depth) continue;
-    // nor does a way out that is the longer of the two: the step has led through the middle
-    if (depth > half_width(one, normal) + half_width(two, normal)) continue;
+    const double depth =
+        kernel::start_overlap(data, i, inner.before, description_.bodies[one].bound, description_.bodies[two].bound);
     if (!(depth > kOverlap * std::min(size(one), size(two)))) continue;
     if (one != last_one || two != last_two) ++pairs;
     last_one = one, last_two = two;

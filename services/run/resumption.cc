@@ -179,7 +179,9 @@ std::vector<kernel::SwapOrder> swaps_to_come(const Resumption& resumed, std::vec
     return true;
   };
   for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
-    if (!order_again(order_of(decision, catalog)) || decision.why() == "swap") continue;
+    kernel::SwapOrder order = order_of(decision, catalog);
+    order.is_final = !is_swap(decision);
+    if (!order_again(std::move(order)) || is_swap(decision)) continue;
     taken_over->push_back(decision);
     warnings->push_back(fmt::format("from step {} on slot {} is answered by {}, as the journal has it ({})",
                                     decision.step(), decision.slot(), decision.plugin(), decision.why()));

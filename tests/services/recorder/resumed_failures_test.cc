@@ -96,6 +96,39 @@ TEST(ResumedRun, AFallbackOfTheJournalIsNoSwap) {
   }
 }
 
+// It is on no probation there: what fails soon after is made again, as it was, and nobody is gone back to.
+TEST(ResumedRun, AFallbackOfTheJournalBearsFailuresAsItDid) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write(
+      "scene.gravitas", harness::read_file(harness::shipped_scene("two_spheres_motor")) +
+                            "Plugins { Plugin { Slot = \"solver\" Fallback = \"Newton\" Failures = 2 } }\n");
+  RunOptions part = in_workers(scene, 60);
+  part.steps = 30;
+  part.checkpoint = folder.path("checkpoint");
+  ASSERT_EQ(run_quietly(part).outcome, RunOutcome::kCompleted);
+  const std::vector<std::byte> early = read_whole_file(part.checkpoint);
+  part.steps = 42;
+  part.resume = part.checkpoint;
+  part.faults = {"solver:kill@step=38", "solver:kill@step=40"};
+  ASSERT_EQ(run_quietly(part).outcome, RunOutcome::kCompleted);
+  RunOptions whole = in_workers(scene, 60);
+  whole.faults = {"solver:kill@step=38", "solver:kill@step=40", "solver:kill@step=44"};
+  const RunResult expected = run_quietly(whole);
+  ASSERT_EQ(expected.report.faults_size(), 3);
+  ASSERT_EQ(expected.report.faults(1).recovered_by(), "fallback Newton");
+  ASSERT_THAT(expected.report.faults(2).recovered_by(), ::testing::StartsWith("standby"));
+  // as if it had been killed after step 42
+  replace_file(part.checkpoint, early);
+  part.steps = 60;
+  part.faults = whole.faults;
+  const RunResult resumed = run_quietly(part);
+  ASSERT_EQ(resumed.outcome, RunOutcome::kCompleted) << resumed.fault;
+  EXPECT_EQ(resumed.report.swaps_size(), 0);
+  EXPECT_EQ(resumed.report.chain_hash(), expected.report.chain_hash());
+  ASSERT_EQ(resumed.report.faults_size(), 2);
+  EXPECT_THAT(resumed.report.faults(1).recovered_by(), ::testing::StartsWith("standby"));
+}
+
 // Who goes on after a pause has all of them again.
 TEST(ResumedRun, BearsAsManyFailuresAfterAPauseByThem) {
   const CurrentFolder here;

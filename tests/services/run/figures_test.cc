@@ -244,6 +244,7 @@ Environment { Space { Bodies {
   Body { Id = "Falls" GeometryId = "Shape" Mass = 1 KineticProperties { Position = {0, 0.001, 0} } Forces = { "Down" } } } } })",
                    1);
     EXPECT_EQ(report.warnings_size(), 0) << shape << ": " << report.warnings(0);
+    EXPECT_LE(report.max_penetration(), 1e-12) << shape;
   }
 }
 

@@ -87,7 +87,9 @@ class Axle final : public ConstraintPlugin {
                          "absent."),
               Property::number("MaximumTorque", "N*m")
                   .at_least(0.0)
-                  .means("Largest torque of the drive; unlimited if absent."),
+                  .means("Largest torque of the drive about RollingAxis; unlimited if absent. Where that is askew to "
+                         "SteeringAxis, drive_torque of --reactions is this over the sine of their angle, so that it "
+                         "steers nothing."),
               Property::number("SuspensionLowerLimit", "m")
                   .at_most(0.0)
                   .means("Smallest way of the wheel along SteeringAxis, relative to body 1, 0 at the start; none if "
