@@ -71,11 +71,14 @@ double Environment::first_limit(double begin, double length, bool* passes) {
 // In an inner step of next to no length, as those that pass a limit are, what has just bounced off is not pressed. Where the limit
 // stops it, it arrives anew in the next one, with its restitution: pressed here it would lose its speed, and restitution act on nothing.
 void Environment::open_parting_contacts() {
-  // of attempts at a part, and of trials (jumps.cc)
+  // of attempts at a part, and of trials (jumps.cc): where friction of turning goes by how contacts squeeze a body
   const bool has_guess = guess_.size() == data_.contact_warm_impulse.size();
-  for (std::size_t k = 0; k < guess_.size() && has_guess; ++k)
-    if (data_.contact_warm_impulse[k] != 0.0 && guess_[k] != 0.0)
+  for (std::size_t k = 0; k < guess_.size() && has_guess; ++k) {
+    const double* const material = &data_.contact_material[kMaterialColumns * (k / 3)];
+    if (material[kRollingFriction] + material[kSpinningFriction] > 0.0 && data_.contact_warm_impulse[k] != 0.0 &&
+        guess_[k] != 0.0)
       data_.contact_warm_impulse[k] = data_.time_step[0] * guess_[k];
+  }
   const double accuracy = description_.accuracy, step = length_of_step(step_count_ + 1);
   if (!(accuracy > 0.0) || data_.time_step[0] > std::max(kNextToNothing * step, kBeyond * kNear * accuracy)) return;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
