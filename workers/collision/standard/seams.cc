@@ -71,7 +71,9 @@ bool may_be_flush(std::span<const Rest> rests, const ContactList& contacts, doub
 // The normal from a to b to take instead of this one, of either's rests; zero if there is none.
 Vector3 flush_normal(const PlacedMap& a, const PlacedMap& b, const PairRests& rests, const Alone& alone,
                      const Vector3& normal, double flush) {
-  const Vector3 along = -flush_direction(rests.of_a, {alone.pair, -alone.front}, a, b, rests.origin, -normal, flush);
+  // what a rests on may be another part of the same pair
+  const Alone of_body{rests.has_parts ? Alone{}.pair : alone.pair, Vector3::Zero()};
+  const Vector3 along = -flush_direction(rests.of_a, of_body, a, b, rests.origin, -normal, flush);
   return along.isZero(0.0) ? flush_direction(rests.of_b, alone, b, a, rests.origin, normal, flush) : along;
 }
 

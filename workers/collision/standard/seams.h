@@ -46,6 +46,7 @@ struct PairRests {
   std::span<const Rest> of_a, of_b;
   Vector3 origin = Vector3::Zero();  // of the frame that shapes are placed in, world; as are the rests
   std::size_t pair = 0;              // the one that is looked at
+  bool has_parts = false;            // of it one is a compound
 
   void swap() { std::swap(of_a, of_b); }
   bool are_none() const { return of_a.empty() && of_b.empty(); }
