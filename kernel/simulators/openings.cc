@@ -95,7 +95,7 @@ Trusted<TrialState> Environment::end_at_opening(Trusted<TrialState> trial, doubl
     }
   }
   *length = open;
-  return data_.time_step[0] == open ? std::move(trial) : integrate_shorter(begin, length);
+  return data_.time_step[0] == open ? trial : integrate_shorter(begin, length);
 }
 
 // Where stops are pressed again in S*: how long an inner step is that ends while they are open. In end_stops_ are the stops where it

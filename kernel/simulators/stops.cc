@@ -35,7 +35,7 @@ void Environment::meet_stops(double begin, double length) {
     Trusted<TrialState> trial = integrate_shorter(begin + done, &stop);
     const bool is_short = stop < asked || reach < length || inner >= kManyInnerSteps;
     if (crossing == 0.0 && inner < kMostMeetings) {
-      trial = end_at_opening(std::move(trial), begin + done, &stop);
+      trial = end_at_opening(trial, begin + done, &stop);
       stop = next_stop(trial, begin + done, stop, &crossing);
       if (is_short) reach = kReach * stop;
     } else {
