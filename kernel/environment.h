@@ -204,7 +204,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool* is_near);
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   double first_limit(double begin, double length, bool* passes);                                            // limits.cc
-  void open_parting_contacts();                                                                             // limits.cc
+  void prepare_contacts();                                                                                  // limits.cc
   // loads.cc: by what loads turn a jointed body in the inner step, rad, and which; true where the step starts again, finer.
   std::pair<double, std::uint32_t> largest_turn_by_loads() const;
   bool makes_step_finer();

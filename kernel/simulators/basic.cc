@@ -128,7 +128,7 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
   if (has_contacts() && !has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(trial)));
   if (sleepers_ > 0 && wakes_sleepers()) return std::nullopt;
   if (constraint_.is_running()) constrain(trial);
-  open_parting_contacts();
+  prepare_contacts();
   // What pressed before does not arrive, and has nothing to bounce with: it came no nearer then, and what turning makes of that
   // since is less the shorter the step. Under a fast rim, whose points come down faster than they would fall, it is more than
   // what solvers take for rest.

@@ -24,6 +24,17 @@ constexpr double kOpen = 1e-12;                   // m or rad
 constexpr double kRolling = 1e-5;                 // m/s: slower parting may be of what rolls
 constexpr double kNextToNothing = 1e-7;           // of the step
 
+// Where friction of turning goes by how contacts squeeze a body, solvers begin with `guess` (per s) for those that pressed before.
+void begin_with(const std::vector<double>& guess, StepData* data) {
+  const Column<double>& impulse = data->contact_warm_impulse;
+  if (guess.size() != impulse.size()) return;
+  for (std::size_t k = 0; k < guess.size(); ++k) {
+    const double* const material = &data->contact_material[kMaterialColumns * (k / 3)];
+    const bool turns = material[kRollingFriction] + material[kSpinningFriction] > 0.0;
+    if (turns && impulse[k] != 0.0 && guess[k] != 0.0) impulse[k] = data->time_step[0] * guess[k];
+  }
+}
+
 }  // namespace
 
 // The longest part, up to `length`, that ends before the next limit that closes; or passes it, soon after it, if the start is near.
@@ -68,17 +79,12 @@ double Environment::first_limit(double begin, double length, bool* passes) {
   return stop;
 }
 
+// What attempts at a part, and trials, begin with (jumps.cc); and what parts is no contact.
+//
 // In an inner step of next to no length, as those that pass a limit are, what has just bounced off is not pressed. Where the limit
 // stops it, it arrives anew in the next one, with its restitution: pressed here it would lose its speed, and restitution act on nothing.
-void Environment::open_parting_contacts() {
-  // of attempts at a part, and of trials (jumps.cc): where friction of turning goes by how contacts squeeze a body
-  const bool has_guess = guess_.size() == data_.contact_warm_impulse.size();
-  for (std::size_t k = 0; k < guess_.size() && has_guess; ++k) {
-    const double* const material = &data_.contact_material[kMaterialColumns * (k / 3)];
-    if (material[kRollingFriction] + material[kSpinningFriction] > 0.0 && data_.contact_warm_impulse[k] != 0.0 &&
-        guess_[k] != 0.0)
-      data_.contact_warm_impulse[k] = data_.time_step[0] * guess_[k];
-  }
+void Environment::prepare_contacts() {
+  begin_with(guess_, &data_);
   const double accuracy = description_.accuracy, step = length_of_step(step_count_ + 1);
   if (!(accuracy > 0.0) || data_.time_step[0] > std::max(kNextToNothing * step, kBeyond * kNear * accuracy)) return;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {

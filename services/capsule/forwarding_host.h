@@ -21,9 +21,9 @@ class ForwardingHost : public kernel::Carrier {
   std::vector<std::string> sandbox() const override { return host_->sandbox(); }
 
  protected:
-  explicit ForwardingHost(std::unique_ptr<kernel::Carrier> host) : host_(std::move(host)) {}
+  explicit ForwardingHost(std::shared_ptr<kernel::Carrier> host) : host_(std::move(host)) {}
 
-  const std::unique_ptr<kernel::Carrier> host_;
+  const std::shared_ptr<kernel::Carrier> host_;
 };
 
 }  // namespace gravitas::capsule

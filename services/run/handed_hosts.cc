@@ -7,30 +7,23 @@
 #include <utility>
 #include <vector>
 
+#include "services/capsule/forwarding_host.h"
+
 namespace gravitas {
 namespace {
 
 // Ends with the last environment that has it.
-class SharedHost final : public kernel::Carrier {
+class SharedHost final : public capsule::ForwardingHost {
  public:
-  explicit SharedHost(std::shared_ptr<kernel::Carrier> host) : host_(std::move(host)) {}
+  explicit SharedHost(std::shared_ptr<kernel::Carrier> host) : ForwardingHost(std::move(host)) {}
 
   kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
                           kernel::DerivativeSource* derivatives) override {
     return host_->call(call, arena, derivatives);
   }
   void drain() override {
-    if (host_.use_count() == 1) host_->drain();
+    if (host_.use_count() == 1) ForwardingHost::drain();
   }
-  void kill() override { host_->kill(); }
-  bool is_alive() const override { return host_->is_alive(); }
-  int process_id() const override { return host_->process_id(); }
-  kernel::Hosting hosting() const override { return host_->hosting(); }
-  std::vector<std::string> take_complaints() override { return host_->take_complaints(); }
-  std::vector<std::string> sandbox() const override { return host_->sandbox(); }
-
- private:
-  const std::shared_ptr<kernel::Carrier> host_;
 };
 
 bool is_at_address(const kernel::SlotDescription& slot) {

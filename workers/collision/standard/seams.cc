@@ -13,11 +13,13 @@ namespace {
 
 constexpr double kFlat = 1e-4;  // sine of an angle wider than that of Rest::is_along()
 
+constexpr std::size_t kNoPair = Rest::kSeveral - 1;
+
 // What a triangle that is looked at without those around it does not know: the pair whose contacts lay nothing flush, and the side
 // to which contacts lead out of its mesh.
 struct Alone {
-  std::size_t pair = Rest::kSeveral - 1;  // none
-  Vector3 front = Vector3::Zero();        // unit; zero: of no triangle
+  std::size_t pair = kNoPair;
+  Vector3 front = Vector3::Zero();  // unit; zero: of no triangle
 
   bool is_triangle() const { return !front.isZero(0.0); }
 };
@@ -72,7 +74,7 @@ bool may_be_flush(std::span<const Rest> rests, const ContactList& contacts, doub
 Vector3 flush_normal(const PlacedMap& a, const PlacedMap& b, const PairRests& rests, const Alone& alone,
                      const Vector3& normal, double flush) {
   // what a rests on may be another part of the same pair
-  const Alone of_body{rests.has_parts ? Alone{}.pair : alone.pair, Vector3::Zero()};
+  const Alone of_body{.pair = rests.has_parts ? kNoPair : alone.pair};
   const Vector3 along = -flush_direction(rests.of_a, of_body, a, b, rests.origin, -normal, flush);
   return along.isZero(0.0) ? flush_direction(rests.of_b, alone, b, a, rests.origin, normal, flush) : along;
 }
