@@ -46,10 +46,14 @@ target_precompile_headers(small PRIVATE <cstddef>)
     write(tree + "/lib/second.cc", "#include \"answer.h\"\nstd::size_t second() { return answer(); }\n");
     return run("cd " + in_shell(tree) + " && cmake -G Ninja -B build -D CMAKE_CXX_COMPILER=clang++ && ninja -C build");
   }
-  std::string rebuild(const std::string& name) const { return run("ninja -C " + in_shell(folder_.path() + "/" + name + "/build")); }
+  std::string rebuild(const std::string& name) const {
+    return run("ninja -C " + in_shell(folder_.path() + "/" + name + "/build"));
+  }
   void leave(const std::string& name) const { fs::remove_all(folder_.path() + "/" + name); }
   void change_header() { header_ += "// changed\n"; }
-  std::string library(const std::string& name) const { return content(folder_.path() + "/" + name + "/build/libsmall.a"); }
+  std::string library(const std::string& name) const {
+    return content(folder_.path() + "/" + name + "/build/libsmall.a");
+  }
 
   // How many compilations the cache has served, and how many it had not.
   int hits() const { return count("direct_cache_hit"); }
