@@ -44,17 +44,21 @@ double Environment::bisect(const Trusted<TrialState>& trial, double begin, doubl
   const auto closes = [&](const Trusted<TrialState>& at) {
     find_contacts_at(at);
     doubtful.clear();
+    bool was_apart = false;
     std::span<const std::uint32_t> touching = front().touching.span();
     for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
       const bool touches = starts_with(contact_pair(i), &touching);
       // what rolls or slides on is the solver's, what flies up is not
       const bool goes_on = touches && start_speed(i) * data_.time_step[0] <= nothing;
       if (goes_on || data_.contact_depth[i] <= nothing) continue;
-      if (gap_at(i, front()) > nothing) return true;
-      comes_back = comes_back || touches;
-      if (!touches) doubtful.insert(doubtful.end(), contact_pair(i).begin(), contact_pair(i).end());
+      if (gap_at(i, front()) > nothing)
+        was_apart = true;
+      else if (touches)
+        comes_back = true;
+      else
+        doubtful.insert(doubtful.end(), contact_pair(i).begin(), contact_pair(i).end());
     }
-    if (doubtful.empty()) return false;
+    if (was_apart || doubtful.empty()) return was_apart;
     if (!knows_overlapping) {
       find_contacts_at(try_step(kFinest * length));
       for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
@@ -109,8 +113,10 @@ double Environment::bisect(const Trusted<TrialState>& trial, double begin, doubl
     }
     return std::max(longest, kFinest * length);
   };
+  // asked of the whole trial: closes() may make shorter ones
+  const bool presses = may_pass();
   bool has_closed = closes(trial);
-  if (comes_back || may_pass()) {
+  if (comes_back || presses) {
     length = longest_trial();
     has_closed = closes(try_step(length));
   }

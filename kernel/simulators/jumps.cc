@@ -36,10 +36,10 @@ double turn_of_slip(const Model& model, std::uint32_t body) {
 }  // namespace
 
 // Of what is redundant solvers go on with the solution that they are given, and find another from one of a step of another length, by
-// which friction that goes by it would seem to jump. So all that begins where a part does is given what the attempt before it began with.
+// which friction that goes by it would seem to jump. So all that begins where a part does is given what an attempt before found there.
 bool Environment::make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces) {
   const double from = i * length / pieces, to = (i + 1) * length / pieces;
-  guess_.clear();
+  guess_.first.clear(), guess_.second.clear();
   if (i == 0) guess_ = first_impulses_;
   begin_inner_step(begin + from, to - from);
   return make_next_state();

@@ -6,6 +6,9 @@
 // one part may pass the closing (extrapolated.cc). One that a trial foretells too late is found as any jump is.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 #include "kernel/environment.h"
 #include "kernel/simulators/location.h"
@@ -24,14 +27,17 @@ constexpr double kOpen = 1e-12;                   // m or rad
 constexpr double kRolling = 1e-5;                 // m/s: slower parting may be of what rolls
 constexpr double kNextToNothing = 1e-7;           // of the step
 
-// Where friction of turning goes by how contacts squeeze a body, solvers begin with `guess` (per s) for those that pressed before.
-void begin_with(const std::vector<double>& guess, StepData* data) {
-  const Column<double>& impulse = data->contact_warm_impulse;
-  if (guess.size() != impulse.size()) return;
-  for (std::size_t k = 0; k < guess.size(); ++k) {
-    const double* const material = &data->contact_material[kMaterialColumns * (k / 3)];
+// Where friction of turning goes by how contacts squeeze a body, solvers begin with impulses (per s) of the same contacts, by key,
+// for those that pressed before.
+void begin_with(std::span<const std::uint64_t> keys, const std::vector<double>& impulses, StepData* data) {
+  if (!std::ranges::equal(keys, data->contact_key.span())) return;
+  const std::span<double> warm = data->contact_warm_impulse.span();
+  for (std::uint32_t i = 0; i < keys.size(); ++i) {
+    const double* const material = &data->contact_material[kMaterialColumns * i];
     const bool turns = material[kRollingFriction] + material[kSpinningFriction] > 0.0;
-    if (turns && impulse[k] != 0.0 && guess[k] != 0.0) impulse[k] = data->time_step[0] * guess[k];
+    const Vector3 guess = vector_at(impulses, i);
+    if (turns && !vector_at(warm, i).isZero(0.0) && !guess.isZero(0.0))
+      set_vector(warm, i, Vector3(data->time_step[0] * guess));
   }
 }
 
@@ -84,7 +90,7 @@ double Environment::first_limit(double begin, double length, bool* passes) {
 // In an inner step of next to no length, as those that pass a limit are, what has just bounced off is not pressed. Where the limit
 // stops it, it arrives anew in the next one, with its restitution: pressed here it would lose its speed, and restitution act on nothing.
 void Environment::prepare_contacts() {
-  begin_with(guess_, &data_);
+  begin_with(guess_.first, guess_.second, &data_);
   const double accuracy = description_.accuracy, step = length_of_step(step_count_ + 1);
   if (!(accuracy > 0.0) || data_.time_step[0] > std::max(kNextToNothing * step, kBeyond * kNear * accuracy)) return;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {

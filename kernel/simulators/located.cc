@@ -68,6 +68,7 @@ NextStop Environment::first_impact(const Trusted<TrialState>& trial, double begi
     bound_motions(i == 0 ? trial : integrate(), left);
     find_impacts(find_pairs());
     NextStop next{left, false};
+    bool looks_again = false;  // a pair that asks for it may meet before another makes the step end
     std::span<const std::uint32_t> touching = front().touching.span();
     for (std::size_t k = 0; k < data_.impact_pair.size(); ++k) {
       const auto pair = data_.pair.span().subspan(2 * data_.impact_pair[k], 2);
@@ -87,9 +88,10 @@ NextStop Environment::first_impact(const Trusted<TrialState>& trial, double begi
           met.bounce_speed = !met.is_touching ? met.start_speed : inner_ > 0 ? bounce_speed(pair) : 0.0;
       }
       const NextStop stop = stop_before(met, left, data_.target_gap[0], shortest_flight);
+      looks_again = looks_again || stop.is_trial;
       if (stop.length < next.length) next = stop;
     }
-    if (!next.is_trial || i == kMostTrials) return {std::max(next.length, kFinest * length), false, next.meets};
+    if (!looks_again || i == kMostTrials) return {std::max(next.length, kFinest * length), false, next.meets};
     left = next.length;
     begin_inner_step(begin, left);
   }

@@ -3,9 +3,9 @@
 // (reaction_holdings.cc), so that trials pass them. An inner step ends just before, the next just behind, short enough that what
 // acts in it is nothing; its solve is the impact. So motion keeps the integrator's order between stops, and what bounces, its energy.
 //
-// An inner step also ends where a limit opens, and before a stop is pressed again (openings.cc). Flights from one stop back to it
-// that are shorter than kShortestHop of the step are none: the stop is at rest (the solver has nothing arrive that left it in the
-// same inner step). After kMostMeetings the rest of the step is Basic's.
+// An inner step also ends where a limit opens or a drive begins to slip (openings.cc), and before a stop is pressed again (flights.cc).
+// Flights from one stop back to it that are shorter than kShortestHop of the step are none: the stop is at rest (the solver has nothing
+// arrive that left it in the same inner step). After kMostMeetings the rest of the step is Basic's.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -35,7 +35,7 @@ void Environment::meet_stops(double begin, double length) {
     Trusted<TrialState> trial = integrate_shorter(begin + done, &stop);
     const bool is_short = stop < asked || reach < length || inner >= kManyInnerSteps;
     if (crossing == 0.0 && inner < kMostMeetings) {
-      trial = end_at_opening(trial, begin + done, &stop);
+      trial = end_where_joints_let_go(trial, begin + done, &stop);
       stop = next_stop(trial, begin + done, stop, &crossing);
       if (is_short) reach = kReach * stop;
     } else {

@@ -85,14 +85,14 @@ target_precompile_headers(small PRIVATE <cstddef>)
 
 TEST(Compile, ATreeInAnotherFolderIsServedWhatTheFirstOneCompiled) {
   const Project project;
-  project.build("first place");
+  project.build("first_place");
   EXPECT_EQ(project.hits(), 0);
   EXPECT_EQ(project.misses(), 1);
-  const std::string library = project.library("first place");
+  const std::string library = project.library("first_place");
   EXPECT_THAT(library, HasSubstr("./lib/first.cc"));
-  EXPECT_THAT(library, Not(HasSubstr("first place")));
+  EXPECT_THAT(library, Not(HasSubstr("first_place")));
 
-  project.leave("first place");
+  project.leave("first_place");
   project.build("second");
   EXPECT_EQ(project.hits(), 1);
   EXPECT_EQ(project.misses(), 1);
