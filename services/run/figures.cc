@@ -255,12 +255,7 @@ void Figures::write(report::v1::Report* report) const {
         runaway_->step + (runaway_->is_given ? 1 : 0), scene_size_,
         runaway_->is_given ? "that is the speed which it was given"
                            : "it runs away, as where TimeStep is too long for the forces and the integrator"));
-  if (const Effort most = largest_effort(); most.calls > kManyCalls)
-    report->add_warnings(fmt::format(
-        "step {} {} {} calls of plugins: the scene is stiff for its integrator, impacts follow each other closely, or "
-        "Accuracy is small; where springs, or light bodies between joints, are stiff, an implicit integrator (Radau, "
-        "Rosenbrock) takes long steps",
-        most.step, most.step > steps_ ? "was not ended after" : "took", most.calls));
+  if (const std::string why = why_dear(); !why.empty()) report->add_warnings(why);
   for (const Drive& drive : drives_) {
     const auto write_drive = [&](auto* message) {
       message->set_constraint(description_.constraints[drive.constraint].id);
@@ -274,11 +269,23 @@ void Figures::write(report::v1::Report* report) const {
   }
 }
 
+std::string Figures::why_dear() const {
+  const Effort most = largest_effort();
+  if (most.calls <= kManyCalls) return {};
+  return fmt::format(
+      "step {} {} {} calls of plugins: the scene is stiff for its integrator, impacts follow each other closely, or "
+      "Accuracy is small; where springs, or light bodies between joints, are stiff, an implicit integrator (Radau, "
+      "Rosenbrock) takes long steps",
+      most.step, most.step > steps_ ? "was not ended after" : "took", most.calls);
+}
+
 void Figures::write(recorder::v1::Tally* tally) const {
   tally->set_largest_kinetic_energy(largest_kinetic_);
   tally->set_largest_energy_deviation(largest_deviation_);
   tally->set_penetration(penetration_);
   tally->set_joint_error(joint_error_);
+  tally->set_most_calls(effort_.calls);
+  tally->set_most_calls_step(effort_.step);
   if (!initial_) return;
   tally->set_initial_energy(initial_->energy());
   tally->clear_initial_momenta();
@@ -292,6 +299,7 @@ void Figures::resume(const recorder::v1::Tally& tally, bool was_edited) {
   largest_deviation_ = tally.largest_energy_deviation();
   penetration_ = tally.penetration();
   joint_error_ = tally.joint_error();
+  effort_ = {tally.most_calls(), tally.most_calls_step()};
   if (was_edited) {
     runaway_.reset();
     opening_step_.reset();
