@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "kernel/simulators/location.h"
 #include "plugin_sdk/counted.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/property_value.h"
@@ -163,8 +162,7 @@ void Figures::find_overlaps(const kernel::InnerStep& inner) {
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < data.contact_depth.size(); ++i) {
     const std::uint32_t one = data.contact_body[2 * i], two = data.contact_body[2 * i + 1];
-    const double depth =
-        kernel::start_overlap(data, i, inner.before, description_.bodies[one].bound, description_.bodies[two].bound);
+    const double depth = inner.start_overlap(i, description_.bodies[one].bound, description_.bodies[two].bound, true);
     if (!(depth > kOverlap * std::min(size(one), size(two)))) continue;
     if (one != last_one || two != last_two) ++pairs;
     last_one = one, last_two = two;

@@ -208,6 +208,20 @@ Environment { Space { Bodies {
   }
 }
 
+// What slides lies elsewhere on the other after the first step, which pushes it out.
+TEST(Figures, AnOverlapOfWhatSlidesAtTheStartIsPenetration) {
+  for (const char* simulator : {"Basic", "Substepping", "Continuous", "Bisection"}) {
+    const report::v1::Report report = figures_of(std::string("Simulator { Type = \"") + simulator + R"(" }
+Geometries { Geometry { Type = "Box" Id = "Box" CustomProperties { HalfExtents = {0.1, 0.1, 0.1} } }
+  Geometry { Type = "Halfspace" Id = "Plane" } }
+Environment { Space { Bodies {
+  Body { Id = "Floor" GeometryId = "Plane" }
+  Body { Id = "Box" GeometryId = "Box" Mass = 1 KineticProperties { Position = {0, 0.09, 0} LinearVelocity = {1, 0, 0} } } } } })",
+                                                 3);
+    EXPECT_NEAR(report.max_penetration(), 0.01, 1e-12) << simulator;
+  }
+}
+
 // What flies into another within the first step was apart.
 TEST(Figures, WhatMeetsInTheFirstStepDoesNotOverlapAtTheStart) {
   const report::v1::Report report = figures_of(R"(
