@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -62,13 +61,14 @@ struct PoisonedCall {
 
 // A part of a step, whose end has become a state.
 struct InnerStep {
-  std::uint32_t number;  // in its step
-  const StepData& data;  // what was worked out for it
-  const State& before;   // where it began
-  const State& after;    // where it ended
-  double end;            // s
-  // Where it ends a part of a step that is extrapolated: those of the attempts at it (Extrapolation::weights()).
-  std::span<const double> weights;
+  std::uint32_t number;             // in its step
+  const StepData& data;             // what was worked out for it
+  const State& before;              // where it began
+  const State& after;               // where it ended
+  double end;                       // s
+  std::span<const double> weights;  // of the attempts at an extrapolated part that it ends: Extrapolation::weights()
+  // How deep a contact's bodies overlapped in `before`, m; 0 where they did not or, `surely`, may not have.
+  double start_overlap(std::size_t contact, const LocalBound& one, const LocalBound& two, bool surely) const;
 };
 
 // Hears of what a recorder keeps, and of what happens.

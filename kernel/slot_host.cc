@@ -16,8 +16,6 @@ constexpr std::chrono::milliseconds kFirstBackOff{1}, kLongestBackOff{100};
 SlotHost::SlotHost(SlotDescription description, std::uint32_t threads, const HostStarter& start)
     : description_(std::move(description)), threads_(threads), start_(start) {}
 
-SlotHost::~SlotHost() = default;
-
 std::uint32_t SlotHost::add(const PluginChoice& plugin) {
   description_.plugins.push_back(plugin);
   return static_cast<std::uint32_t>(description_.plugins.size() - 1);
@@ -201,14 +199,16 @@ Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* po
   }
 }
 
-void SlotHost::cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description, bool is_final) {
+void SlotHost::cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description, bool has_taken_over) {
   end_probation();
-  old_ = std::exchange(carrier_, std::move(carrier)), swapped_ = slot;
+  old_ = std::exchange(carrier_, std::move(carrier));
+  swapped_ = slot;
   previous_.insert_or_assign(slot, description_);
-  if (is_final) end_probation(), previous_.erase(slot);
+  if (has_taken_over) {
+    end_probation();
+    previous_.erase(slot);
+  }
   replace_description(std::move(description));
 }
-
-void SlotHost::end_probation() { retire(std::move(old_)); }
 
 }  // namespace gravitas::kernel

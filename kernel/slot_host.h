@@ -46,7 +46,6 @@ class SlotHost {
 
   // Without plugins: add() them before the start, and get their rows.
   SlotHost(SlotDescription description, std::uint32_t threads, const HostStarter& start);
-  ~SlotHost();
   std::uint32_t add(const PluginChoice& plugin);
 
   // Split so that the workers of all hosts start side by side. The second throws StageFault. Each slot asks for both.
@@ -75,11 +74,11 @@ class SlotHost {
   // A host for a swap, in preparation.
   std::unique_ptr<Spare> prepare(const SlotDescription& description) const;
   // Lets `carrier`, with another plugin of the slot, answer from now on; the old one stays warm until end_probation(), or is gone.
-  void cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description, bool is_final);
+  void cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description, bool has_taken_over);
   // Why the slot's fallbacks could not be held; empty if they could.
   std::string why_no_fallback(Slot slot) const { return why_apart(after_fallback(slot).plugins); }
   bool is_on_probation() const { return old_ != nullptr; }
-  void end_probation();
+  void end_probation() { retire(std::move(old_)); }
   // Ends a host in the background: a dying process must not hold up a step.
   void retire(std::shared_ptr<Carrier> carrier);
   void retire(std::unique_ptr<Spare> spare);

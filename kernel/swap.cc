@@ -80,7 +80,7 @@ void StageSlot::prepare_swaps() {
     swap.next = now;
     PluginChoice& next = swap.next.plugins[row] = swap.order.plugin;
     next.fallback = now.plugins[row].fallback;
-    if (swap.order.is_final && next.fallback && is_same_plugin(*next.fallback, next)) next.fallback = nullptr;
+    if (swap.order.has_taken_over && next.fallback && is_same_plugin(*next.fallback, next)) next.fallback = nullptr;
     if (swap.order.hosting) swap.next.hosting = *swap.order.hosting;
     if (swap.order.plugin.is_elsewhere()) swap.next.hosting = Hosting::kGrpc;
     swap.next.end_attachment();
@@ -162,10 +162,10 @@ void StageSlot::cut_over(PendingSwap* swap) {
   SlotHost& host = *hosts_[swap->host];
   if (host.is_on_probation()) close_all_probations(&host, SwapState::kCommitted, {});
   SwapRecord& record = swaps_[swap->record];
-  record.state = swap->order.is_final ? SwapState::kCommitted : SwapState::kProbation, record.step = step_;
+  record.state = swap->order.has_taken_over ? SwapState::kCommitted : SwapState::kProbation, record.step = step_;
   swap->is_in_shadow = false, record.shadow = swap->shadow.result();
-  host.cut_over(which_, std::move(swap->candidate), std::move(swap->next), swap->order.is_final);
-  if (!swap->order.is_final) probation_.push_back({&host, swap->record});
+  host.cut_over(which_, std::move(swap->candidate), std::move(swap->next), swap->order.has_taken_over);
+  if (!swap->order.has_taken_over) probation_.push_back({&host, swap->record});
   // who comes in is asked already: a comparison that is lost in that would be taken out from under this swap
   is_watched_ = false;
   let_all_adopt(host, "swap", swap->target);
@@ -236,7 +236,10 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, const CallT
   } catch (const StageFault& fault) {
     if (!fault.plugin.empty()) throw;
     // an answer, where nobody goes on with it
-    if (fault.kind == FaultKind::kRefusal && swap->only_compare) return swap->shadow.add_refusal(fault.text()), true;
+    if (fault.kind == FaultKind::kRefusal && swap->only_compare) {
+      swap->shadow.add_refusal(fault.text());
+      return true;
+    }
     if (fault.kind != FaultKind::kDeadline || swap->only_compare) {
       refuse(swap, "in shadow: " + fault.text());
       return false;

@@ -12,7 +12,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "kernel/description.h"
 #include "kernel/shadow.h"
@@ -25,7 +24,7 @@ struct SwapOrder {
   PluginChoice plugin;             // in a list slot it takes the place of the plugin whose types it declares
   std::optional<Hosting> hosting;  // as before if absent
   std::uint32_t step = 0;          // cut over before this step is made; a step of the past: before the next
-  bool is_final = false;  // somebody took over so before: no probation, none to go back to, no fallback on itself
+  bool has_taken_over = false;     // in a run before: no probation, none to go back to, no fallback on itself
 };
 
 enum class SwapState : std::uint32_t { kPreparing, kShadow, kProbation, kCommitted, kRolledBack, kRefused };

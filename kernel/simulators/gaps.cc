@@ -38,16 +38,15 @@ double half_width(const LocalBound& bound, const Quaternion& orientation, const 
 
 }  // namespace
 
-double start_overlap(const StepData& data, std::size_t contact, const State& start, const LocalBound& one,
-                     const LocalBound& two) {
+double InnerStep::start_overlap(std::size_t contact, const LocalBound& one, const LocalBound& two, bool surely) const {
   const Vector3 normal = vector_at(data.contact_normal.span(), contact);
-  const Vector3 apart = between_surfaces(data, contact, start);
+  const Vector3 apart = between_surfaces(data, contact, before);
   const double depth = -normal.dot(apart);
-  // points that have come from elsewhere tell nothing
-  if (!((apart + depth * normal).norm() <= depth)) return 0.0;
-  // nor does a way out that is the longer of the two: the step has led through the middle
+  // what has come across may have been apart; what slid lay as deep
+  if (!(depth > 0.0) || (surely && (apart + depth * normal).norm() > depth)) return 0.0;
+  // a way out that is the longer of the two tells nothing: the step has led through the middle
   const auto width = [&](const LocalBound& bound, std::size_t side) {
-    return half_width(bound, quaternion_at(start.orientation.span(), data.contact_body[2 * contact + side]), normal);
+    return half_width(bound, quaternion_at(before.orientation.span(), data.contact_body[2 * contact + side]), normal);
   };
   return depth > width(one, 0) + width(two, 1) ? 0.0 : depth;
 }
@@ -59,6 +58,7 @@ double Environment::gap_at(std::size_t contact, const State& state) const {
 // Overlap of every contact at S_{n+1}, in the first step and after an edit where it begins, too, and the pairs that touch.
 void Environment::find_touching() {
   const Column<std::uint32_t>&now = data_.touching, &before = front().touching;
+  const InnerStep inner{inner_, data_, front(), back(), inner_end_time(), {}};
   // room for all: what grows moves, and spans are held
   now.resize(data_.contact_body.size());
   now.resize(0);
@@ -70,7 +70,7 @@ void Environment::find_touching() {
     const double gap = gap_at(i, back());
     const bool begins = is_anew_ && inner_ == 0 && data_.contact_depth[i] > 0.0;
     if (begins)
-      start_overlap_ = std::max(start_overlap_, start_overlap(data_, i, front(), model_.bound[a], model_.bound[b]));
+      start_overlap_ = std::max(start_overlap_, inner.start_overlap(i, model_.bound[a], model_.bound[b], false));
     figures_.penetration = std::max(figures_.penetration, -gap);
     const bool touched_before = starts_with(data_.contact_body.span().subspan(2 * i, 2), &touched);
     // what touched, and opened no further in a very short inner step, is no flight

@@ -39,10 +39,6 @@ inline bool may_open(const DiscrepancyAnswer& joints, std::size_t i) {
   return mode == AxisMode::kUnilateral || (mode == AxisMode::kLimited && joints.lower[i] < joints.upper[i]);
 }
 
-// gaps.cc: how deep the two bodies of a contact overlapped where the inner step began, m; 0 where it tells of no overlap.
-double start_overlap(const StepData& data, std::size_t contact, const State& start, const LocalBound& one,
-                     const LocalBound& two);
-
 // turns.cc: what two bodies overlap by no more than this is pushed out on the side where it came in, m.
 double harmless_depth(const LocalBound& one, const LocalBound& two);
 

@@ -242,6 +242,7 @@ void judge_collision_independence(Subject& subject, bool varies) {
   const auto count = static_cast<std::uint32_t>(all.pairs.size() / 2);
   Inquiry inquiry(subject, std::to_string(count) + " pairs at once");
   const std::vector<Touch> together = all.ask(&inquiry);
+  Inquiry same = inquiry.demanding_answers();
   std::size_t next = 0;
   for (std::uint32_t pair = 0; pair < count; ++pair) {
     const std::span<const std::uint32_t> bodies(&all.pairs[2 * std::size_t{pair}], 2);
@@ -254,20 +255,20 @@ void judge_collision_independence(Subject& subject, bool varies) {
       if (i == pair) place = static_cast<std::uint32_t>(alone.pairs.size() / 2);
       alone.pairs.insert(alone.pairs.end(), other.begin(), other.end());
     }
-    inquiry.now_asked("pair " + std::to_string(pair) + " of " + std::to_string(count) +
-                      ", with the other pairs of its bodies and among all");
-    for (const Touch& one : alone.ask(&inquiry)) {
+    same.now_asked("pair " + std::to_string(pair) + " of " + std::to_string(count) +
+                   ", with the other pairs of its bodies and among all");
+    for (const Touch& one : alone.ask(&same)) {
       if (one.pair != place) continue;
-      inquiry.expect(next < together.size() && together[next].pair == pair, "has fewer contacts among the others");
+      same.expect(next < together.size() && together[next].pair == pair, "has fewer contacts among the others");
       const Touch& other = together[next++];
-      inquiry.expect_near("normal", other.normal, one.normal, 0.0);
-      inquiry.expect_near("point", other.point, one.point, 0.0);
-      inquiry.expect_near("depth", other.depth, one.depth, 0.0);
-      inquiry.expect(other.feature == one.feature, "feature is " + std::to_string(other.feature) +
-                                                       " among the others and " + std::to_string(one.feature) +
-                                                       " with those of its bodies");
+      same.expect_near("normal", other.normal, one.normal, 0.0);
+      same.expect_near("point", other.point, one.point, 0.0);
+      same.expect_near("depth", other.depth, one.depth, 0.0);
+      same.expect(other.feature == one.feature, "feature is " + std::to_string(other.feature) +
+                                                    " among the others and " + std::to_string(one.feature) +
+                                                    " with those of its bodies");
     }
-    inquiry.expect(next == together.size() || together[next].pair > pair, "has more contacts among the others");
+    same.expect(next == together.size() || together[next].pair > pair, "has more contacts among the others");
   }
 }
 

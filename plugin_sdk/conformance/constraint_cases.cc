@@ -183,7 +183,8 @@ void judge_constraint_frames(Subject& subject) {
       body.pose.orientation = normalized(body.pose.orientation);
       body.twist = {moved.orientation * body.twist.linear, moved.orientation * body.twist.angular};
     }
-    const std::vector<DescribedJoint> other = world.describe(&inquiry);
+    Inquiry same = inquiry.demanding_answers();
+    const std::vector<DescribedJoint> other = world.describe(&same);
     inquiry.expect(other.size() == plain.size(),
                    "has " + std::to_string(other.size()) + " discrepancies instead of " + std::to_string(plain.size()));
     for (std::size_t i = 0; i < plain.size(); ++i) {
@@ -207,12 +208,13 @@ void judge_world(Subject& subject) {
     by_body.bodies.emplace_back();
     by_body.joints[0].body1 = 2;
     Inquiry inquiry(subject, name + " to the world, and to a body at rest at the origin");
-    by_world.bind(&inquiry), by_body.bind(&inquiry);
+    Inquiry same = inquiry.demanding_answers();
+    by_world.bind(&inquiry), by_body.bind(&same);
     for (std::size_t i = 0; i < 2; ++i) {
       const Pose moved = displaced(by_world.bodies[i].pose, draw.vector(0.1), draw.vector(0.1));
       by_world.bodies[i].pose = by_body.bodies[i].pose = moved;
     }
-    const std::vector<DescribedJoint> a = by_world.describe(&inquiry), b = by_body.describe(&inquiry);
+    const std::vector<DescribedJoint> a = by_world.describe(&inquiry), b = by_body.describe(&same);
     inquiry.expect(a.size() == b.size(),
                    "has " + std::to_string(a.size()) + " discrepancies instead of " + std::to_string(b.size()));
     for (std::size_t i = 0; i < a.size(); ++i) {
@@ -264,7 +266,8 @@ void judge_constraint_permutation(Subject& subject, bool varies) {
     mixed.bodies[place[i]] = plain.bodies[i];
   }
   Inquiry inquiry(subject, std::to_string(count) + " joints, and the same in other rows");
-  plain.bind(&inquiry), mixed.bind(&inquiry);
+  Inquiry same = inquiry.demanding_answers();
+  plain.bind(&inquiry), mixed.bind(&same);
   for (std::size_t i = 0; i < count; ++i) {
     JointedBody& body = plain.bodies[i];
     body.pose = displaced(body.pose, draw.vector(0.1), draw.vector(0.1));
@@ -273,7 +276,7 @@ void judge_constraint_permutation(Subject& subject, bool varies) {
   std::vector<std::vector<Discrepancy>> right(count);
   for (const DescribedJoint& one : plain.describe(&inquiry)) right[row[one.joint]].push_back(one.discrepancy);
   std::vector<std::size_t> described(count, 0);
-  for (const DescribedJoint& one : mixed.describe(&inquiry)) {
+  for (const DescribedJoint& one : mixed.describe(&same)) {
     const std::size_t next = described[one.joint]++;
     inquiry.now_asked("joint " + std::to_string(one.joint) + " of " + std::to_string(count) +
                       ", and the same in another row");
@@ -308,22 +311,22 @@ void judge_constraint_independence(Subject& subject, bool varies) {
   all.bodies = moved;
   all.joints[broken].intact = 0;
   const std::vector<DescribedJoint> together = all.describe(&inquiry);
+  Inquiry same = inquiry.demanding_answers();
   std::size_t next = 0;
   for (std::uint32_t j = 0; j < all.joints.size(); ++j) {
     if (all.joints[j].intact == 0) continue;
     Joints alone;
     alone.bodies = start;
     alone.joints = {all.joints[j]};
-    inquiry.now_asked("joint " + std::to_string(j) + " of " + std::to_string(all.joints.size()) +
-                      ", alone and among the others");
-    alone.bind(&inquiry);
+    same.now_asked("joint " + std::to_string(j) + " of " + std::to_string(all.joints.size()) +
+                   ", alone and among the others");
+    alone.bind(&same);
     alone.bodies = moved;
-    for (const DescribedJoint& one : alone.describe(&inquiry)) {
-      inquiry.expect(next < together.size() && together[next].joint == j, "has fewer discrepancies among the others");
-      expect_same(inquiry, together[next++].discrepancy, one.discrepancy);
+    for (const DescribedJoint& one : alone.describe(&same)) {
+      same.expect(next < together.size() && together[next].joint == j, "has fewer discrepancies among the others");
+      expect_same(same, together[next++].discrepancy, one.discrepancy);
     }
   }
-  inquiry.now_asked(std::to_string(all.joints.size()) + " joints, number " + std::to_string(broken) + " broken");
   inquiry.expect(next == together.size(),
                  "has " + std::to_string(together.size()) + " discrepancies, should have " + std::to_string(next));
 }

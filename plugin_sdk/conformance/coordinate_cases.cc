@@ -22,7 +22,7 @@ struct ToldCoordinate {
 };
 
 std::vector<ToldCoordinate> told(const Joints& world, Inquiry* inquiry) {
-  const MessageColumns reply = inquiry->answer(kCoordinates, world.describe_request());
+  const MessageColumns reply = world.answer(inquiry, kCoordinates);
   std::vector<ToldCoordinate> all;
   for (std::size_t i = 0; i < reply.u32("constraint").size(); ++i) {
     const ToldCoordinate one{reply.u32("constraint")[i], reply.u32("coordinate")[i], reply.f64("value")[i],
@@ -148,7 +148,8 @@ void judge_broken(Subject& subject, bool varies) {
   const std::vector<ToldCoordinate> whole = told(all, &inquiry);
   const auto broken = static_cast<std::uint32_t>(all.joints.size() / 2);
   all.joints[broken].intact = 0;
-  const std::vector<ToldCoordinate> rest = told(all, &inquiry);
+  Inquiry same = inquiry.demanding_answers();
+  const std::vector<ToldCoordinate> rest = told(all, &same);
   std::vector<ToldCoordinate> expected = whole;
   std::erase_if(expected, [&](const ToldCoordinate& one) { return one.joint == broken; });
   inquiry.expect(are_of_one_kind(rest, expected), "the others have other coordinates");
@@ -157,7 +158,7 @@ void judge_broken(Subject& subject, bool varies) {
     inquiry.expect_near("rate of row " + std::to_string(i), rest[i].rate, expected[i].rate, 0.0);
   }
   all.joints[broken].intact = 1;
-  const std::vector<ToldCoordinate> again = told(all, &inquiry);
+  const std::vector<ToldCoordinate> again = told(all, &same);
   inquiry.expect(are_of_one_kind(again, whole), "has other coordinates, asked again");
   for (std::size_t i = 0; i < again.size(); ++i)
     inquiry.expect(again[i].value == whole[i].value && again[i].rate == whole[i].rate,

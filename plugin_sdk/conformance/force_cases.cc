@@ -77,8 +77,17 @@ struct ForceAnswer {
   std::uint32_t flags = 0;
 };
 
+// Refused only where an application alone is.
+MessageColumns answer(Inquiry* inquiry, stage::Method method, const Forces& forces) {
+  return inquiry->answer_rows(method, forces.request(), forces.applications.size() / 2, [&](std::size_t i) {
+    Forces alone = forces;
+    alone.applications = {forces.applications[2 * i], forces.applications[2 * i + 1]};
+    return alone.request();
+  });
+}
+
 std::vector<ForceAnswer> ask(Inquiry* inquiry, const Forces& forces) {
-  const MessageColumns reply = inquiry->answer(kWrenches, forces.request());
+  const MessageColumns reply = answer(inquiry, kWrenches, forces);
   std::vector<ForceAnswer> answers;
   for (std::size_t i = 0; i < reply.u32("flags").size(); ++i) {
     const std::vector<double>&wrench = reply.f64("wrench"), &impulse = reply.f64("impulse");
@@ -183,24 +192,25 @@ void judge_force_independence(Subject& subject, bool varies) {
   const Forces forces = mixture(subject, 7, varies, &draw);
   const std::size_t count = forces.applications.size() / 2;
   Inquiry inquiry(subject, std::to_string(count) + " applications at once, and the same backwards");
-  const MessageColumns all = inquiry.answer(kWrenches, forces.request());
+  const MessageColumns all = answer(&inquiry, kWrenches, forces);
+  Inquiry same = inquiry.demanding_answers();
   Forces backwards = forces;
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t k = 0; k < 2; ++k)
       backwards.applications[2 * i + k] = forces.applications[2 * (count - 1 - i) + k];
-  const MessageColumns reversed = inquiry.answer(kWrenches, backwards.request());
+  const MessageColumns reversed = answer(&same, kWrenches, backwards);
   for (std::size_t i = 0; i < count; ++i) {
     Forces one = forces;
     one.applications = {forces.applications[2 * i], forces.applications[2 * i + 1]};
-    inquiry.now_asked("application " + std::to_string(i) + " of " + std::to_string(count) +
-                      ", alone and among the others");
-    const MessageColumns alone = inquiry.answer(kWrenches, one.request());
+    same.now_asked("application " + std::to_string(i) + " of " + std::to_string(count) +
+                   ", alone and among the others");
+    const MessageColumns alone = answer(&same, kWrenches, one);
     for (const char* column : {"wrench", "impulse", "potential"}) {
       const std::size_t width = alone.f64(column).size();
       const std::span<const double> right = alone.f64(column);
-      inquiry.expect_equal(column, std::span(all.f64(column)).subspan(i * width, width), right);
-      inquiry.expect_equal(std::string(column) + " in another order",
-                           std::span(reversed.f64(column)).subspan((count - 1 - i) * width, width), right);
+      same.expect_equal(column, std::span(all.f64(column)).subspan(i * width, width), right);
+      same.expect_equal(std::string(column) + " in another order",
+                        std::span(reversed.f64(column)).subspan((count - 1 - i) * width, width), right);
     }
   }
 }
@@ -222,7 +232,8 @@ void judge_force_permutation(Subject& subject, bool varies) {
     for (const TypeDeclaration& type : subject.declaration().types)
       if (type_id(type.name) == plain.types[force]) rename_bodies(type.properties, place, &mixed.parameters[force]);
   Inquiry inquiry(subject, std::to_string(count) + " applications to 300 bodies, and the same in other rows");
-  const std::vector<ForceAnswer> a = ask(&inquiry, plain), b = ask(&inquiry, mixed);
+  Inquiry same = inquiry.demanding_answers();
+  const std::vector<ForceAnswer> a = ask(&inquiry, plain), b = ask(&same, mixed);
   for (std::size_t i = 0; i < count; ++i) {
     const ForceAnswer &one = a[i], &other = b[row[i]];
     const std::string of = " of application " + std::to_string(i) + " in another row";
@@ -319,7 +330,7 @@ constexpr stage::Method kJacobians = stage::Method::kForceJacobians;
 
 // Six rows and twelve columns a body.
 Eigen::MatrixXd jacobian_of(Inquiry* inquiry, const Forces& forces) {
-  const MessageColumns reply = inquiry->answer(kJacobians, forces.request());
+  const MessageColumns reply = answer(inquiry, kJacobians, forces);
   const std::vector<std::uint32_t>& bodies = reply.u32("block_body");
   const auto count = static_cast<Eigen::Index>(forces.bodies.size());
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(6 * count, 12 * count);
@@ -376,9 +387,9 @@ void judge_jacobian_pattern(Subject& subject, bool varies) {
   Draw draw(40);
   Forces forces = mixture(subject, 3, varies, &draw);
   Inquiry inquiry(subject, "forces of all types on three bodies, in one state and in another");
-  const std::vector<std::uint32_t> here = inquiry.answer(kJacobians, forces.request()).u32("block_body");
+  const std::vector<std::uint32_t> here = answer(&inquiry, kJacobians, forces).u32("block_body");
   for (PushedBody& body : forces.bodies) body = random_body(&draw);
-  const std::vector<std::uint32_t> there = inquiry.answer(kJacobians, forces.request()).u32("block_body");
+  const std::vector<std::uint32_t> there = answer(&inquiry, kJacobians, forces).u32("block_body");
   inquiry.expect(here == there, "answered other blocks");
   forces.applications.clear();
   inquiry.now_asked("forces and bodies, nothing applied");

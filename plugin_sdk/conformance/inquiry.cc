@@ -92,6 +92,12 @@ std::string shown(const Quaternion& q) {
 
 // ---- questions
 
+Inquiry Inquiry::demanding_answers() const {
+  Inquiry other = *this;
+  other.may_be_refused_ = false;
+  return other;
+}
+
 Answer Inquiry::ask(stage::Method method, const MessageColumns& request, const DerivativeFunction& derivative) {
   return subject_.ask(method, request, derivative);
 }
@@ -110,11 +116,21 @@ void Inquiry::expect_finite(stage::Method method, const MessageColumns& reply) c
 MessageColumns Inquiry::answer(stage::Method method, const MessageColumns& request,
                                const DerivativeFunction& derivative) {
   Answer answer = ask(method, request, derivative);
-  if (is_refusal(answer) && !answer.text.empty())
+  if (is_refusal(answer) && !answer.text.empty() && may_be_refused_)
     throw Refused(asked_ + ": must be answered, came: " + outcome_of(answer));
   if (!answer.ok()) fail("must be answered, came: " + outcome_of(answer));
   expect_finite(method, answer.columns);
   return std::move(answer.columns);
+}
+
+MessageColumns Inquiry::answer_rows(stage::Method method, const MessageColumns& request, std::size_t rows,
+                                    const std::function<MessageColumns(std::size_t)>& alone) {
+  try {
+    return answer(method, request);
+  } catch (const Refused& refused) {
+    for (std::size_t i = 0; i < rows; ++i) answer(method, alone(i));
+    throw Finding(std::string(refused.what()) + "; each of its rows alone is answered");
+  }
 }
 
 std::optional<MessageColumns> Inquiry::answer_or_refusal(stage::Method method, const MessageColumns& request,

@@ -36,7 +36,7 @@ class Refused : public Finding {
 // A case whose judge throws a Finding where the claim fails.
 Case make_case(std::string name, std::string claim, std::function<void(Subject&)> judge);
 // One that asks with drawn values of properties that need not be given, too (vary() of sample_values.h), which may be refused in
-// any state: then it asks again without.
+// any state: then it asks again without. What is refused among others must be refused alone, too: Inquiry::answer_rows().
 Case make_varied_case(std::string name, std::string claim, std::function<void(Subject&, bool varies)> judge);
 
 // A request with every single value zero and no rows.
@@ -58,10 +58,15 @@ class Inquiry {
 
   void now_asked(std::string asked) { asked_ = std::move(asked); }
   const PluginDeclaration& declaration() const { return subject_.declaration(); }
+  // For questions that come to the same as one that has been answered: a refusal is a finding like any other.
+  Inquiry demanding_answers() const;
 
   // The answer, which must be GRAVITAS_OK and hold finite numbers only.
   MessageColumns answer(stage::Method method, const MessageColumns& request, const DerivativeFunction& derivative = {});
-  // The same for hostile questions, where GRAVITAS_REFUSED with a reason is as good: nothing then.
+  // The same of a question of many rows, which may be refused only where one of these alone is; `alone` asks row by row.
+  MessageColumns answer_rows(stage::Method method, const MessageColumns& request, std::size_t rows,
+                             const std::function<MessageColumns(std::size_t)>& alone);
+  // As answer() for hostile questions, where GRAVITAS_REFUSED with a reason is as good: nothing then.
   std::optional<MessageColumns> answer_or_refusal(stage::Method method, const MessageColumns& request,
                                                   const DerivativeFunction& derivative = {});
   // Demands GRAVITAS_REFUSED with a reason.
@@ -88,6 +93,7 @@ class Inquiry {
 
   Subject& subject_;
   std::string asked_;
+  bool may_be_refused_ = true;
 };
 
 }  // namespace gravitas::conformance

@@ -38,7 +38,7 @@ MessageColumns Joints::bind_request() const {
 }
 
 void Joints::bind(Inquiry* inquiry) {
-  const MessageColumns reply = inquiry->answer(stage::Method::kConstraintBind, bind_request());
+  const MessageColumns reply = answer(inquiry, stage::Method::kConstraintBind);
   bound_begin_ = reply.u32("bound_begin");
   bound_ = reply.f64("bound");
   check_bound(*inquiry, bound_begin_, bound_.size());
@@ -77,7 +77,7 @@ MessageColumns Joints::describe_request() const {
 }
 
 std::vector<DescribedJoint> Joints::describe(Inquiry* inquiry) const {
-  const MessageColumns reply = inquiry->answer(stage::Method::kConstraintDiscrepancies, describe_request());
+  const MessageColumns reply = answer(inquiry, stage::Method::kConstraintDiscrepancies);
   const DiscrepancyColumns columns = discrepancy_columns(reply);
   inquiry->expect_unit("axes", columns.axes, 4);
   std::vector<DescribedJoint> described;
@@ -100,6 +100,22 @@ std::vector<DescribedJoint> Joints::describe(Inquiry* inquiry) const {
     described.push_back({joint, d});
   }
   return described;
+}
+
+Joints Joints::alone(std::size_t joint) const {
+  Joints one = *this;
+  one.joints = {joints[joint]};
+  if (bound_begin_.size() != joints.size() + 1) return one;
+  one.bound_.assign(bound_.begin() + bound_begin_[joint], bound_.begin() + bound_begin_[joint + 1]);
+  one.bound_begin_ = {0, static_cast<std::uint32_t>(one.bound_.size())};
+  return one;
+}
+
+MessageColumns Joints::answer(Inquiry* inquiry, stage::Method method) const {
+  const auto request = [&](const Joints& of) {
+    return method == stage::Method::kConstraintBind ? of.bind_request() : of.describe_request();
+  };
+  return inquiry->answer_rows(method, request(*this), joints.size(), [&](std::size_t i) { return request(alone(i)); });
 }
 
 JointedBody Joints::end(const Joint& joint, int which) const {

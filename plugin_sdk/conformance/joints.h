@@ -45,12 +45,17 @@ class Joints {
   // The discrepancies in the present state, checked for what every discrepancy must be.
   std::vector<DescribedJoint> describe(Inquiry* inquiry) const;
 
+  // What is answered to bind_request(), or else to describe_request(), which may be refused only where a joint of these alone is.
+  MessageColumns answer(Inquiry* inquiry, stage::Method method) const;
+
   JointedBody end(const Joint& joint, int which) const;
   // J v along an axis in the present state.
   double row_velocity(const DescribedJoint& described, const Vector3& axis) const;
 
  private:
   void add_poses(MessageColumns* request) const;
+  // Between the same bodies, bound as it is among the others.
+  Joints alone(std::size_t joint) const;
 
   std::vector<std::uint32_t> bound_begin_ = {0};
   std::vector<double> bound_;

@@ -15,6 +15,7 @@
 #include "plugin_sdk/property_value.h"
 #include "plugin_sdk/slots.h"
 #include "services/recorder/identity.h"
+#include "services/run/counting_host.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_desk.h"
 #include "services/run/fault_spec.h"
@@ -71,7 +72,11 @@ ServedRun::~ServedRun() {
 }
 
 kernel::HostStarter ServedRun::starter() {
-  return interruptible(with_fault_desk(hosts_.for_environment(), &environment_), [this] { return is_ending_.load(); });
+  return interruptible(counting(with_fault_desk(hosts_.for_environment(), &environment_),
+                                [this] {
+                                  if (is_stepping_) figures_->count_call();
+                                }),
+                       [this] { return is_ending_.load(); });
 }
 
 void ServedRun::begin_environment(const Resumption* from) {
@@ -118,6 +123,7 @@ void ServedRun::begin_environment(const Resumption* from) {
     orders_.push_back({std::move(one), OrderKind::kSwap, ++last_order_, rank});
   }
   warnings_ = scene_warnings_;
+  dear_step_.clear();
   fault_.clear();
   checkpoint_.clear();
   resume_command_.clear();
@@ -182,6 +188,7 @@ void ServedRun::on_turn() {
   if (!is_paced || now >= due()) {
     note_step(now);
     make_step();
+    is_stepping_ = false;  // whatever threw
     note_step({});
   }
   if (state_ != State::kRunning) return;
@@ -206,7 +213,10 @@ void ServedRun::make_step() {
     // the initial state, too
     if (environment_->step_count() == 0) figures_->follow(environment_.get());
     const bool wakes = !environment_->wake_orders().empty();  // which no journal knows
-    if (environment_->step() == kernel::StepOutcome::kPaused) {
+    is_stepping_ = true;
+    const kernel::StepOutcome outcome = environment_->step();
+    is_stepping_ = false;
+    if (outcome == kernel::StepOutcome::kPaused) {
       const kernel::FaultRecord& record = *environment_->fault();
       fault_ = pause_text(description_, record, poisoned_step_ >= record.step);
       return keep_faulted_state();

@@ -235,6 +235,7 @@ class ServedRun final : private kernel::CommitListener {
   std::optional<EventSource> event_source_;
   std::optional<ReactionLog> reactions_;
   std::unique_ptr<Figures> figures_;
+  bool is_stepping_ = false;
   std::unique_ptr<Recorder> recorder_;
   const std::shared_ptr<capsule::Tape> tape_ = std::make_shared<capsule::Tape>();
   const HandedHosts hosts_{capsule::recording(tape_)};
@@ -260,6 +261,7 @@ class ServedRun final : private kernel::CommitListener {
   std::uint32_t last_order_ = 0;       // its number
   std::vector<std::string> warnings_;  // different ones
   Clock::time_point next_collection_;
+  std::string dear_step_;  // what the warnings say of one
 
   std::optional<std::uint32_t> steps_left_;  // of a step order
   std::promise<void> step_order_;

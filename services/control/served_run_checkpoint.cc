@@ -165,7 +165,7 @@ std::string ServedRun::command_to_resume() {
   // what was ordered for later, and what is compared still
   options.comparisons.clear();
   for (const Order& one : pending_orders()) {
-    const auto& [slot, plugin, hosting, step, is_final] = one.swap;
+    const auto& [slot, plugin, hosting, step, has_taken_over] = one.swap;
     if (one.kind == OrderKind::kSetting) {
       if (recorder_->keeps()) continue;  // the journal has it
       add_warning(fmt::format("what was set of {} for step {} is not part of the command that goes on",

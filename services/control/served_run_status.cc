@@ -130,6 +130,11 @@ api::Status ServedRun::status_now() {
   keep_last(status.mutable_edits());
   collect_warnings();
   if (const std::string line = recorder_->warning(); !line.empty()) add_warning(line);
+  if (const std::string line = figures_->why_dear(); !line.empty() && line != dear_step_) {
+    // of the dearest alone
+    std::erase(warnings_, dear_step_);
+    add_warning(dear_step_ = line);
+  }
   status.set_warning_count(static_cast<std::uint32_t>(warnings_.size()));
   if (!warnings_.empty()) status.set_last_warning(warnings_.back());
   const std::lock_guard lock(known_mutex_);

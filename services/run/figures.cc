@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "kernel/simulators/location.h"
 #include "plugin_sdk/counted.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/property_value.h"
@@ -163,8 +162,7 @@ void Figures::find_overlaps(const kernel::InnerStep& inner) {
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < data.contact_depth.size(); ++i) {
     const std::uint32_t one = data.contact_body[2 * i], two = data.contact_body[2 * i + 1];
-    const double depth =
-        kernel::start_overlap(data, i, inner.before, description_.bodies[one].bound, description_.bodies[two].bound);
+    const double depth = inner.start_overlap(i, description_.bodies[one].bound, description_.bodies[two].bound, true);
     if (!(depth > kOverlap * std::min(size(one), size(two)))) continue;
     if (one != last_one || two != last_two) ++pairs;
     last_one = one, last_two = two;
@@ -255,12 +253,7 @@ void Figures::write(report::v1::Report* report) const {
         runaway_->step + (runaway_->is_given ? 1 : 0), scene_size_,
         runaway_->is_given ? "that is the speed which it was given"
                            : "it runs away, as where TimeStep is too long for the forces and the integrator"));
-  if (const Effort most = largest_effort(); most.calls > kManyCalls)
-    report->add_warnings(fmt::format(
-        "step {} {} {} calls of plugins: the scene is stiff for its integrator, impacts follow each other closely, or "
-        "Accuracy is small; where springs, or light bodies between joints, are stiff, an implicit integrator (Radau, "
-        "Rosenbrock) takes long steps",
-        most.step, most.step > steps_ ? "was not ended after" : "took", most.calls));
+  if (const std::string why = why_dear(); !why.empty()) report->add_warnings(why);
   for (const Drive& drive : drives_) {
     const auto write_drive = [&](auto* message) {
       message->set_constraint(description_.constraints[drive.constraint].id);
@@ -274,11 +267,23 @@ void Figures::write(report::v1::Report* report) const {
   }
 }
 
+std::string Figures::why_dear() const {
+  const Effort most = largest_effort();
+  if (most.calls <= kManyCalls) return {};
+  return fmt::format(
+      "step {} {} {} calls of plugins: the scene is stiff for its integrator, impacts follow each other closely, or "
+      "Accuracy is small; where springs, or light bodies between joints, are stiff, an implicit integrator (Radau, "
+      "Rosenbrock) takes long steps",
+      most.step, most.step > steps_ ? "was not ended after" : "took", most.calls);
+}
+
 void Figures::write(recorder::v1::Tally* tally) const {
   tally->set_largest_kinetic_energy(largest_kinetic_);
   tally->set_largest_energy_deviation(largest_deviation_);
   tally->set_penetration(penetration_);
   tally->set_joint_error(joint_error_);
+  tally->set_most_calls(effort_.calls);
+  tally->set_most_calls_step(effort_.step);
   if (!initial_) return;
   tally->set_initial_energy(initial_->energy());
   tally->clear_initial_momenta();
@@ -292,6 +297,7 @@ void Figures::resume(const recorder::v1::Tally& tally, bool was_edited) {
   largest_deviation_ = tally.largest_energy_deviation();
   penetration_ = tally.penetration();
   joint_error_ = tally.joint_error();
+  effort_ = {tally.most_calls(), tally.most_calls_step()};
   if (was_edited) {
     runaway_.reset();
     opening_step_.reset();

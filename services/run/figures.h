@@ -18,7 +18,7 @@ class Figures {
   // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential); then
   // its energy and momenta are written as NaN.
   void follow(kernel::Environment* environment);
-  // Called for every call of a plugin in a step.
+  // Called for every call of a plugin in a step, but for those that only compare.
   void count_call() { ++calls_; }
   // Called for every inner step.
   void look_at(const kernel::InnerStep& inner);
@@ -28,6 +28,9 @@ class Figures {
   // Energy, momenta, penetration, joint error, drives; warnings where joints came open, and why, where a body runs away, where
   // bodies overlap at the start, and where a step, be it the one that was not ended, takes very many calls.
   void write(report::v1::Report* report) const;
+
+  // The warning of a step that takes very many calls; empty where none does.
+  std::string why_dear() const;
 
   // The extremes so far, into a checkpoint and out of it. To resume: follow() the initial state, resume(), and follow()
   // from the restored state on.

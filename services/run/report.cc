@@ -135,7 +135,8 @@ void write_comparison(const Comparison& from, const kernel::Environment& environ
   to->set_differing_calls(from.differing_calls);
   to->set_refused_calls(from.refused_calls);
   to->set_first_refusal(from.first_refusal);
-  const double per_call = from.calls == 0 ? 0.0 : 1e-3 / static_cast<double>(from.calls);
+  const std::uint64_t answered = from.calls - from.refused_calls;
+  const double per_call = answered == 0 ? 0.0 : 1e-3 / static_cast<double>(answered);
   to->set_from_us(per_call * static_cast<double>(from.first_ns));
   to->set_to_us(per_call * static_cast<double>(from.second_ns));
   for (const Disagreement& one : from.disagreements) {

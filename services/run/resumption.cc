@@ -180,7 +180,7 @@ std::vector<kernel::SwapOrder> swaps_to_come(const Resumption& resumed, std::vec
   };
   for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
     kernel::SwapOrder order = order_of(decision, catalog);
-    order.is_final = !is_swap(decision);
+    order.has_taken_over = !is_swap(decision);
     if (!order_again(std::move(order)) || is_swap(decision)) continue;
     taken_over->push_back(decision);
     warnings->push_back(fmt::format("from step {} on slot {} is answered by {}, as the journal has it ({})",

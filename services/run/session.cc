@@ -26,6 +26,7 @@
 #include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/recorder/trajectory.h"
+#include "services/run/counting_host.h"
 #include "services/run/edit_spec.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_desk.h"
@@ -160,10 +161,11 @@ class Run final : private kernel::CommitListener {
   }
 
   kernel::HostStarter starter() {
-    return interruptible(with_fault_desk(hosts_.for_environment(), &environment_), [this] {
-      if (is_stepping_) figures_->count_call();
-      return is_stepping_ && interrupted_();
-    });
+    return interruptible(counting(with_fault_desk(hosts_.for_environment(), &environment_),
+                                  [this] {
+                                    if (is_stepping_) figures_->count_call();
+                                  }),
+                         [this] { return is_stepping_ && interrupted_(); });
   }
 
   // Whatever ended the run: the last commit is kept where a checkpoint is wanted or needed.

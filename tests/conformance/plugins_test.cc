@@ -92,7 +92,14 @@ const Wrong kWrong[] = {
     {"constraint_backward_stop", {"constraint/rows"}, "growth (m/s) of the joint error"},
     {"constraint_no_force", {"constraint/rows"}, "with a maximum_force of 0"},
     {"constraint_first_body", {"constraint/world", "constraint/permutation"}, "point1 of discrepancy 0 is"},
+    {"constraint_stays_near", {"constraint/frames"}, "must be answered, came: REFUSED (joint 0: body 1 has gone"},
+    {"constraint_one_at_a_time",
+     {"constraint/permutation"},
+     "more than one joint); each of its rows alone is answered"},
     {"force_first_body", {"force/permutation"}, "force of application 0 in another row is"},
+    {"force_one_at_a_time",
+     {"force/independence", "force/permutation"},
+     "more than one push); each of its rows alone is answered"},
     // the second: its type lacks properties that the scene language gives it
     {"force_wrong_torque", {"force/basic", "force/basic-table"}, "torque is"},
     // with what its refusal says

@@ -208,6 +208,20 @@ Environment { Space { Bodies {
   }
 }
 
+// What slides lies elsewhere on the other after the first step, which pushes it out.
+TEST(Figures, AnOverlapOfWhatSlidesAtTheStartIsPenetration) {
+  for (const char* simulator : {"Basic", "Substepping", "Continuous", "Bisection"}) {
+    const report::v1::Report report = figures_of(std::string("Simulator { Type = \"") + simulator + R"(" }
+Geometries { Geometry { Type = "Box" Id = "Box" CustomProperties { HalfExtents = {0.1, 0.1, 0.1} } }
+  Geometry { Type = "Halfspace" Id = "Plane" } }
+Environment { Space { Bodies {
+  Body { Id = "Floor" GeometryId = "Plane" }
+  Body { Id = "Box" GeometryId = "Box" Mass = 1 KineticProperties { Position = {0, 0.09, 0} LinearVelocity = {1, 0, 0} } } } } })",
+                                                 3);
+    EXPECT_NEAR(report.max_penetration(), 0.01, 1e-12) << simulator;
+  }
+}
+
 // What flies into another within the first step was apart.
 TEST(Figures, WhatMeetsInTheFirstStepDoesNotOverlapAtTheStart) {
   const report::v1::Report report = figures_of(R"(
@@ -280,8 +294,7 @@ Environment { Space { Bodies {
 }
 
 // A damper that wears off within 1e-7 s, three of which an explicit method takes in an inner step.
-TEST(Figures, TellOfAStepThatTakesManyCalls) {
-  const ScratchFolder folder;
+RunOptions dear_steps(const ScratchFolder& folder) {
   RunOptions options;
   options.scenes = {folder.write("scene", R"(
 Forces { Force { Type = "Spring" Id = "Rod" CustomProperties { Stiffness = 1e7 Damping = 1e7 } } }
@@ -289,6 +302,12 @@ Simulator { CustomProperties { TimeStep = 0.01 Duration = 0.01 } }
 Environment { KineticIntegrator = "DormandPrince54" Space { Bodies {
   Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { Position = {1, 0, 0} LinearVelocity = {-1, 0, 0} } Forces = {"Rod"} } } } })")};
   options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
+  return options;
+}
+
+TEST(Figures, TellOfAStepThatTakesManyCalls) {
+  const ScratchFolder folder;
+  RunOptions options = dear_steps(folder);
   const auto warnings = [&](std::uint64_t calls) {
     return run(
                options, [&] { return --calls == 0; }, [](const Progress&) {})
@@ -299,6 +318,45 @@ Environment { KineticIntegrator = "DormandPrince54" Space { Bodies {
   EXPECT_THAT(warnings(0), ElementsAre(HasSubstr("step 1 took ")));
   options.overrides = {"Integrator=Radau"};
   EXPECT_THAT(warnings(0), ::testing::IsEmpty());
+}
+
+// The last step of what goes on is a hundredth of the one that took them.
+TEST(Figures, TellOfADearStepBeforeACheckpoint) {
+  const ScratchFolder folder;
+  RunOptions options = dear_steps(folder);
+  options.overrides = {"Simulator.Duration=0.0101"};
+  options.checkpoint = folder.path("kept");
+  bool is_over = false;
+  const RunResult first = run(
+      options, [&] { return is_over; }, [&](const Progress&) { is_over = true; });
+  ASSERT_EQ(first.report.steps(), 1U);
+  options.resume = options.checkpoint;
+  options.checkpoint.clear();
+  const RunResult second = harness::run_quietly(options);
+  EXPECT_EQ(second.report.steps(), 2U);
+  const auto is_dear = ::testing::Contains(HasSubstr("step 1 took "));
+  EXPECT_THAT(first.report.warnings(), is_dear);
+  EXPECT_THAT(second.report.warnings(), is_dear);
+}
+
+// What is asked for comparison alone, and what that asks for, makes no step dear.
+TEST(Figures, CallsOfComparisonsMakeNoStepDear) {
+  const ScratchFolder folder;
+  RunOptions options = dear_steps(folder);
+  const auto calls = [&] {
+    const RunResult result = harness::run_quietly(options);
+    for (const std::string& warning : result.report.warnings())
+      if (warning.find("calls of plugins") != std::string::npos) return warning;
+    return std::string();
+  };
+  const std::string plain = calls();
+  EXPECT_THAT(plain, HasSubstr("step 1 took "));
+  options.reruns = {"integrator=1", "force=1"};
+  EXPECT_EQ(calls(), plain);
+  options.overrides = {"Integrator=Radau"};
+  options.reruns.clear();
+  options.comparisons = {"integrator=DormandPrince54"};
+  EXPECT_EQ(calls(), "");
 }
 
 TEST(Figures, OfAnEmptyWorldAreZero) {
