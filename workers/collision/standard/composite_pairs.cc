@@ -123,24 +123,25 @@ bool choose_normal(const PlacedPair& pair, const TriangleSide& a, const Triangle
 
 class Collector {
  public:
-  Collector(const Pose& frame, std::uint64_t key, double merge, bool is_reversed, ContactList* out)
+  Collector(const Pose& frame, std::uint64_t key, const Parts& parts, double merge, bool is_reversed, ContactList* out)
       : R_(frame.orientation.toRotationMatrix()),
         p_(frame.position),
         key_(key),
+        parts_(parts),
         merge_(merge),
         is_reversed_(is_reversed),
         out_(out) {}
 
   // A contact in the frame, its normal from the mesh to the other.
   void add(std::uint64_t part, const ContactPoint& contact) const {
-    out_->collect(key_of_part(key_, part), moved(contact), merge_);
+    out_->collect(key_of_part(key_, part), parts_, moved(contact), merge_);
   }
   void add(std::uint64_t part, const Manifold& manifold) const {
     for (int i = 0; i < manifold.count; ++i) add(part, manifold.contacts[static_cast<std::size_t>(i)]);
   }
   // What lies on a flat face: features keep their names from triangle to triangle.
   void add_on_face(std::uint32_t face, const ContactPoint& contact) const {
-    out_->collect_on_face(key_of_part(key_, kFace | face), moved(contact), merge_);
+    out_->collect_on_face(key_of_part(key_, kFace | face), parts_, moved(contact), merge_);
   }
   void add_on_face(std::uint32_t face, const Manifold& manifold) const {
     for (int i = 0; i < manifold.count; ++i) add_on_face(face, manifold.contacts[static_cast<std::size_t>(i)]);
@@ -171,6 +172,7 @@ class Collector {
   Matrix3 R_;
   Vector3 p_;
   std::uint64_t key_;
+  Parts parts_;
   double merge_;
   bool is_reversed_;
   ContactList* out_;
@@ -480,22 +482,27 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
   if (a.compound != nullptr) {
     for (std::size_t i = 0; i < a.compound->children.size(); ++i) {
       const CompoundShape::Child& child = a.compound->children[i];
-      collide_parts(child.shape, compose(X_WA, child.pose), b, X_WB, key_of_part(key, 2 * i), rests, margin, out);
+      PairRests of_child = rests;
+      of_child.parts.of_a = key_of_part(rests.parts.of_a, i);
+      collide_parts(child.shape, compose(X_WA, child.pose), b, X_WB, key_of_part(key, 2 * i), of_child, margin, out);
     }
   } else if (b.compound != nullptr) {
     for (std::size_t i = 0; i < b.compound->children.size(); ++i) {
       const CompoundShape::Child& child = b.compound->children[i];
-      collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), rests, margin, out);
+      PairRests of_child = rests;
+      of_child.parts.of_b = key_of_part(rests.parts.of_b, i);
+      collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), of_child, margin,
+                    out);
     }
   } else if (a.mesh != nullptr && b.mesh != nullptr) {
     collide_mesh_mesh(a, b, relative(X_WA, X_WB), {rests, X_WA, flush_length(a, b)}, margin,
-                      Collector(X_WA, key, merge_distance(a, b), false, out));
+                      Collector(X_WA, key, rests.parts, merge_distance(a, b), false, out));
   } else if (a.mesh != nullptr || b.mesh != nullptr) {
     const bool is_reversed = a.mesh == nullptr;
     const Shape &mesh = is_reversed ? b : a, &other = is_reversed ? a : b;
     const Pose X_MO = is_reversed ? relative(X_WB, X_WA) : relative(X_WA, X_WB);
     const Pose& X_WM = is_reversed ? X_WB : X_WA;
-    const Collector collector(X_WM, key, merge_distance(a, b), is_reversed, out);
+    const Collector collector(X_WM, key, rests.parts, merge_distance(a, b), is_reversed, out);
     if (other.type == ShapeType::kHalfspace) {
       collide_mesh_halfspace(*mesh.mesh, X_MO.orientation * Vector3::UnitY(), X_MO.position, margin, collector);
     } else {
@@ -510,7 +517,7 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
     collide(a, X_WA, b, X_WB, margin, &manifold);
     lay_flush(a, X_WA, b, X_WB, rests, margin, &manifold);
     for (int i = 0; i < manifold.count; ++i)
-      out->collect(key, manifold.contacts[static_cast<std::size_t>(i)], merge_distance(a, b));
+      out->collect(key, rests.parts, manifold.contacts[static_cast<std::size_t>(i)], merge_distance(a, b));
   }
 }
 
