@@ -84,6 +84,10 @@ struct TriangleSide {
 
   Vector3 normal() const { return R * (side * mesh.normal(triangle)); }
   NormalKind kind(const Vector3& n) const { return classify(mesh, triangle, R.transpose() * n, side); }
+  // m: of a solid
+  double half_thickness() const {
+    return mesh.is_closed() ? mesh.box().half_extents().minCoeff() : std::numeric_limits<double>::infinity();
+  }
 };
 
 // The normal at which a triangle `a` touches the other side of the pair: nothing if it is not for it to say. `other` is
@@ -115,7 +119,10 @@ bool choose_normal(const PlacedPair& pair, const TriangleSide& a, const Triangle
   *normal = kind == NormalKind::kFlush ? a.normal() : Vector3(-other->normal());
   // what has sunk below the plane by more than half is no longer on it
   const Vector3 arm = pair.p_AB + pair.R_AB * pair.b.centre() - pair.a.centre();
-  if (other == nullptr && !(normal->dot(arm) > 0.0)) return false;
+  const bool is_sunk = other == nullptr
+                           ? !(normal->dot(arm) > 0.0)
+                           : pair.depth_along(*normal) > std::min(a.half_thickness(), other->half_thickness());
+  if (is_sunk) return false;
   return allows(*normal);
 }
 
