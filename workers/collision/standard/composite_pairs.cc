@@ -191,12 +191,12 @@ struct Flush {
   const Pose& X_FM;  // of the mesh in the frame of the rests
   double length;     // m
 
-  void lay(const PlacedPair& pair, const Vector3& front, double margin, Manifold* manifold) const {
-    lay_flush(pair, front, X_FM, rests, length, margin, manifold);
+  void lay(const PlacedPair& pair, const Fronts& fronts, double margin, Manifold* manifold) const {
+    lay_flush(pair, fronts, X_FM, rests, length, margin, manifold);
   }
   // Would it lay contacts along the front?
   bool turns(const PlacedPair& pair, const Vector3& front) const {
-    return !flush_normal(pair, front, front, X_FM, rests, length).isZero(0.0);
+    return !flush_normal(pair, {front}, front, X_FM, rests, length).isZero(0.0);
   }
 };
 
@@ -282,7 +282,7 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
       const bool is_flat = normal.dot(up) > kOnFace;
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold, is_flat ? is_inside : nullptr);
     }
-    flush.lay(pair, up, margin, &manifold);
+    flush.lay(pair, {up}, margin, &manifold);
     is_claimed = is_claimed || manifold.count > 0;
     if (manifold.count == 0 && is_before)
       shallowest = std::min(shallowest, std::max(1e-6 * map.radius(), pair.depth_along(up)));
@@ -448,7 +448,7 @@ void collide_mesh_mesh(const Shape& shape_a, const Shape& shape_b, const Pose& X
       if (!choose_normal(pair, side_a, &side_b, least, &normal, &is_least)) return;
       Manifold manifold;
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
-      flush.lay(pair, side_a.normal(), margin, &manifold);
+      flush.lay(pair, {side_a.normal(), side_b.normal()}, margin, &manifold);
       any = any || manifold.count > 0;
       out.add(std::uint64_t{ta} << 32 | tb, manifold);
     });

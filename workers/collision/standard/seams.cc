@@ -79,19 +79,19 @@ double flush_length(const Shape& a, const Shape& b) {
   return 1e-6 * std::min(smallest_half_extent(a), smallest_half_extent(b));
 }
 
-Vector3 flush_normal(const PlacedPair& pair, const Vector3& front, const Vector3& normal, const Pose& X_FA,
+Vector3 flush_normal(const PlacedPair& pair, const Fronts& fronts, const Vector3& normal, const Pose& X_FA,
                      const PairRests& rests, double flush) {
   if (rests.are_none()) return Vector3::Zero();
   const Matrix3 R_FA = X_FA.orientation.toRotationMatrix();
-  const PlacedMap a{pair.a, R_FA, X_FA.position, R_FA * front};
-  const PlacedMap b{pair.b, R_FA * pair.R_AB, X_FA.position + R_FA * pair.p_AB};
+  const PlacedMap a{pair.a, R_FA, X_FA.position, R_FA * fronts.of_a};
+  const PlacedMap b{pair.b, R_FA * pair.R_AB, X_FA.position + R_FA * pair.p_AB, R_FA * fronts.of_b};
   return R_FA.transpose() * flush_normal(a, b, rests, R_FA * normal, flush);
 }
 
-void lay_flush(const PlacedPair& pair, const Vector3& front, const Pose& X_FA, const PairRests& rests, double flush,
+void lay_flush(const PlacedPair& pair, const Fronts& fronts, const Pose& X_FA, const PairRests& rests, double flush,
                double margin, Manifold* manifold) {
   if (manifold->count == 0) return;
-  const Vector3 along = flush_normal(pair, front, manifold->contacts[0].normal, X_FA, rests, flush);
+  const Vector3 along = flush_normal(pair, fronts, manifold->contacts[0].normal, X_FA, rests, flush);
   if (!along.isZero(0.0)) contacts_along(pair, along, margin, nullptr, manifold);
 }
 

@@ -60,12 +60,18 @@ double flush_length(const Shape& a, const Shape& b);
 // Replaces the contacts of two bounded convex shapes, in a frame F with world axes, where the above asks for it.
 void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
                double margin, Manifold* manifold);
-// The same of a triangle of a mesh, whose front is to this side (unit), and a convex part, with the contacts in the frame of the
-// triangle, which lies at X_FA.
-void lay_flush(const PlacedPair& pair, const Vector3& front, const Pose& X_FA, const PairRests& rests, double flush,
+// Of a triangle of a mesh, and what it touches: the side (unit) to which contacts lead out of the mesh, in the frame of the triangle.
+struct Fronts {
+  Vector3 of_a;
+  Vector3 of_b = Vector3::Zero();  // zero: b is a convex part, not a triangle
+};
+
+// The same of a triangle of a mesh and a convex part or another triangle, with the contacts in the frame of the triangle, which
+// lies at X_FA.
+void lay_flush(const PlacedPair& pair, const Fronts& fronts, const Pose& X_FA, const PairRests& rests, double flush,
                double margin, Manifold* manifold);
 // The normal that it takes instead of this one, both in the frame of the triangle; zero where it leaves that.
-Vector3 flush_normal(const PlacedPair& pair, const Vector3& front, const Vector3& normal, const Pose& X_FA,
+Vector3 flush_normal(const PlacedPair& pair, const Fronts& fronts, const Vector3& normal, const Pose& X_FA,
                      const PairRests& rests, double flush);
 
 class Seams {
