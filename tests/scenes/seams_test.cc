@@ -207,6 +207,35 @@ TEST_P(SeamsOfBlocks, UnderAMeshOfAnySizeAreNotFelt) {
             << half.x() << " at " << speed << ' ' << turn.w();
 }
 
+// Where it has sunk less than a corner is away from the side of the next tile, that contact was told in the middle of the side, as
+// if the tile were no floor.
+TEST(SeamOfBoxes, IsNotFeltByACornerAtIt) {
+  const Quaternion turn(0.10818558134882535, 0.23299521886664257, 0.7258353035900393, 0.6381004780094256);
+  const Vector3 g(0.47149016201107646, 2.0992480987818842, -9.571152200591495);
+  const Vector3 velocity(1.1440389792254329, 0.3917642056826947, -0.26537190624677826);
+  SceneRun run(
+      "Geometries {\n" +
+      geometry("LeftBlock", "Box", "HalfExtents = {0.30577243600444504, 0.04370574237863131, 0.0566303963082901}") +
+      geometry("RightBlock", "Box", "HalfExtents = {0.2699342739469488, 0.13431865135707746, 0.1958867945786137}") +
+      geometry("Box", "Box", "HalfExtents = {0.02172321225902461, 0.01293871466377237, 0.01972464954166907}") +
+      "}\nMaterials { Material { Id = \"Smooth\" StaticFrictionCoefficient = 0 } }\n"
+      "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = " +
+      literal(g) +
+      " } } }\nSimulator { Type = \"Continuous\" CustomProperties { TimeStep = 0.002095779269032781 Duration = "
+      "0.10478896345163907 } }\nEnvironment { ConstraintSolver = \"Newton\" Space { Bodies {\n" +
+      tile("Right", "RightBlock", {0.31573413853390225, 0.13777131634578224, -0.23973714155719578}, turn) +
+      tile("Left", "LeftBlock", {-0.11229205888064643, 0.10543351140048642, -0.056695101486832274}, turn) +
+      "Body { Id = \"Slider\" GeometryId = \"Box\" Mass = 0.10973691186284543 Material = \"Smooth\" Forces = { "
+      "\"Down\" } KineticProperties { Position = {0.050776208074834725, -0.0175634249325107, -0.022412556690716078} "
+      "Orientation = {-0.7239454318899293, -0.6341570338329736, 0.1201832750224909, 0.24352381503815373} "
+      "LinearVelocity = " +
+      literal(velocity) + " } }\n} } }\n");
+  run.to_end();
+  const Vector3 up = turn * Vector3::UnitY();
+  const Vector3 end = velocity + run.time() * (g - up.dot(g) * up);
+  EXPECT_LE((run.body("Slider").twist.linear - end).norm(), 1e-6);
+}
+
 // A cylinder that rolls over a seam at a slant touches the next box with an end of its lowest line first: beside its top, on
 // its edge.
 TEST_P(Seams, AreNotFeltByACylinderThatRolls) {
