@@ -207,8 +207,8 @@ TEST_P(SeamsOfBlocks, UnderAMeshOfAnySizeAreNotFelt) {
             << half.x() << " at " << speed << ' ' << turn.w();
 }
 
-// Where it has sunk less than a corner is away from the side of the next tile, that contact was told in the middle of the side, as
-// if the tile were no floor.
+// Where its edge is about to touch the side of the next tile, that contact was told in the middle of the side, as if the tile were no
+// floor.
 TEST(SeamOfBoxes, IsNotFeltByACornerAtIt) {
   const Quaternion turn(0.10818558134882535, 0.23299521886664257, 0.7258353035900393, 0.6381004780094256);
   const Vector3 g(0.47149016201107646, 2.0992480987818842, -9.571152200591495);

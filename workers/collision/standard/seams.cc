@@ -60,8 +60,9 @@ bool may_be_flush(std::span<const Rest> rests, const ContactList& contacts, doub
       if (rest.is_along(side * contact.normal)) continue;
       const double height = rest.height(contact.point);
       const double slack = flush + margin + kFlat * (contact.point - rest.point).norm();
-      // a corner that comes over an edge by less than a rounding is told at the middle of the side below it
-      if (height <= slack) return true;
+      if (height <= slack && height >= rest.lowest() - slack) return true;
+      // where an edge is about to touch a side, it may be told at the middle of either
+      if (std::fabs(contact.depth) <= flush) return true;
     }
   return false;
 }
