@@ -84,6 +84,10 @@ struct TriangleSide {
 
   Vector3 normal() const { return R * (side * mesh.normal(triangle)); }
   NormalKind kind(const Vector3& n) const { return classify(mesh, triangle, R.transpose() * n, side); }
+  // m: of a solid
+  double half_thickness() const {
+    return mesh.is_closed() ? mesh.box().half_extents().minCoeff() : std::numeric_limits<double>::infinity();
+  }
 };
 
 // The normal at which a triangle `a` touches the other side of the pair: nothing if it is not for it to say. `other` is
@@ -115,7 +119,10 @@ bool choose_normal(const PlacedPair& pair, const TriangleSide& a, const Triangle
   *normal = kind == NormalKind::kFlush ? a.normal() : Vector3(-other->normal());
   // what has sunk below the plane by more than half is no longer on it
   const Vector3 arm = pair.p_AB + pair.R_AB * pair.b.centre() - pair.a.centre();
-  if (other == nullptr && !(normal->dot(arm) > 0.0)) return false;
+  const bool is_sunk = other == nullptr
+                           ? !(normal->dot(arm) > 0.0)
+                           : pair.depth_along(*normal) > std::min(a.half_thickness(), other->half_thickness());
+  if (is_sunk) return false;
   return allows(*normal);
 }
 
@@ -123,24 +130,25 @@ bool choose_normal(const PlacedPair& pair, const TriangleSide& a, const Triangle
 
 class Collector {
  public:
-  Collector(const Pose& frame, std::uint64_t key, double merge, bool is_reversed, ContactList* out)
+  Collector(const Pose& frame, std::uint64_t key, const Parts& parts, double merge, bool is_reversed, ContactList* out)
       : R_(frame.orientation.toRotationMatrix()),
         p_(frame.position),
         key_(key),
+        parts_(parts),
         merge_(merge),
         is_reversed_(is_reversed),
         out_(out) {}
 
   // A contact in the frame, its normal from the mesh to the other.
   void add(std::uint64_t part, const ContactPoint& contact) const {
-    out_->collect(key_of_part(key_, part), moved(contact), merge_);
+    out_->collect(key_of_part(key_, part), parts_, moved(contact), merge_);
   }
   void add(std::uint64_t part, const Manifold& manifold) const {
     for (int i = 0; i < manifold.count; ++i) add(part, manifold.contacts[static_cast<std::size_t>(i)]);
   }
   // What lies on a flat face: features keep their names from triangle to triangle.
   void add_on_face(std::uint32_t face, const ContactPoint& contact) const {
-    out_->collect_on_face(key_of_part(key_, kFace | face), moved(contact), merge_);
+    out_->collect_on_face(key_of_part(key_, kFace | face), parts_, moved(contact), merge_);
   }
   void add_on_face(std::uint32_t face, const Manifold& manifold) const {
     for (int i = 0; i < manifold.count; ++i) add_on_face(face, manifold.contacts[static_cast<std::size_t>(i)]);
@@ -171,6 +179,7 @@ class Collector {
   Matrix3 R_;
   Vector3 p_;
   std::uint64_t key_;
+  Parts parts_;
   double merge_;
   bool is_reversed_;
   ContactList* out_;
@@ -182,12 +191,12 @@ struct Flush {
   const Pose& X_FM;  // of the mesh in the frame of the rests
   double length;     // m
 
-  void lay(const PlacedPair& pair, const Vector3& front, double margin, Manifold* manifold) const {
-    lay_flush(pair, front, X_FM, rests, length, margin, manifold);
+  void lay(const PlacedPair& pair, const Fronts& fronts, double margin, Manifold* manifold) const {
+    lay_flush(pair, fronts, X_FM, rests, length, margin, manifold);
   }
   // Would it lay contacts along the front?
   bool turns(const PlacedPair& pair, const Vector3& front) const {
-    return !flush_normal(pair, front, front, X_FM, rests, length).isZero(0.0);
+    return !flush_normal(pair, {front}, front, X_FM, rests, length).isZero(0.0);
   }
 };
 
@@ -273,7 +282,7 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
       const bool is_flat = normal.dot(up) > kOnFace;
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold, is_flat ? is_inside : nullptr);
     }
-    flush.lay(pair, up, margin, &manifold);
+    flush.lay(pair, {up}, margin, &manifold);
     is_claimed = is_claimed || manifold.count > 0;
     if (manifold.count == 0 && is_before)
       shallowest = std::min(shallowest, std::max(1e-6 * map.radius(), pair.depth_along(up)));
@@ -439,7 +448,7 @@ void collide_mesh_mesh(const Shape& shape_a, const Shape& shape_b, const Pose& X
       if (!choose_normal(pair, side_a, &side_b, least, &normal, &is_least)) return;
       Manifold manifold;
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
-      flush.lay(pair, side_a.normal(), margin, &manifold);
+      flush.lay(pair, {side_a.normal(), side_b.normal()}, margin, &manifold);
       any = any || manifold.count > 0;
       out.add(std::uint64_t{ta} << 32 | tb, manifold);
     });
@@ -480,22 +489,27 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
   if (a.compound != nullptr) {
     for (std::size_t i = 0; i < a.compound->children.size(); ++i) {
       const CompoundShape::Child& child = a.compound->children[i];
-      collide_parts(child.shape, compose(X_WA, child.pose), b, X_WB, key_of_part(key, 2 * i), rests, margin, out);
+      PairRests of_child = rests;
+      of_child.parts.of_a = key_of_part(rests.parts.of_a, i);
+      collide_parts(child.shape, compose(X_WA, child.pose), b, X_WB, key_of_part(key, 2 * i), of_child, margin, out);
     }
   } else if (b.compound != nullptr) {
     for (std::size_t i = 0; i < b.compound->children.size(); ++i) {
       const CompoundShape::Child& child = b.compound->children[i];
-      collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), rests, margin, out);
+      PairRests of_child = rests;
+      of_child.parts.of_b = key_of_part(rests.parts.of_b, i);
+      collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), of_child, margin,
+                    out);
     }
   } else if (a.mesh != nullptr && b.mesh != nullptr) {
     collide_mesh_mesh(a, b, relative(X_WA, X_WB), {rests, X_WA, flush_length(a, b)}, margin,
-                      Collector(X_WA, key, merge_distance(a, b), false, out));
+                      Collector(X_WA, key, rests.parts, merge_distance(a, b), false, out));
   } else if (a.mesh != nullptr || b.mesh != nullptr) {
     const bool is_reversed = a.mesh == nullptr;
     const Shape &mesh = is_reversed ? b : a, &other = is_reversed ? a : b;
     const Pose X_MO = is_reversed ? relative(X_WB, X_WA) : relative(X_WA, X_WB);
     const Pose& X_WM = is_reversed ? X_WB : X_WA;
-    const Collector collector(X_WM, key, merge_distance(a, b), is_reversed, out);
+    const Collector collector(X_WM, key, rests.parts, merge_distance(a, b), is_reversed, out);
     if (other.type == ShapeType::kHalfspace) {
       collide_mesh_halfspace(*mesh.mesh, X_MO.orientation * Vector3::UnitY(), X_MO.position, margin, collector);
     } else {
@@ -510,7 +524,7 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
     collide(a, X_WA, b, X_WB, margin, &manifold);
     lay_flush(a, X_WA, b, X_WB, rests, margin, &manifold);
     for (int i = 0; i < manifold.count; ++i)
-      out->collect(key, manifold.contacts[static_cast<std::size_t>(i)], merge_distance(a, b));
+      out->collect(key, rests.parts, manifold.contacts[static_cast<std::size_t>(i)], merge_distance(a, b));
   }
 }
 

@@ -86,7 +86,6 @@ void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB,
   if (is_swapped) own.swap();
   if (is_composite) {
     own.origin = X_W1.position;
-    own.has_parts = a.compound != nullptr || b.compound != nullptr;
     collide_composite(first, {Vector3::Zero(), X_W1.orientation}, second,
                       {X_W2.position - X_W1.position, X_W2.orientation}, own, margin, out);
     out->finish(X_W1.position, is_swapped);

@@ -11,7 +11,8 @@
 // make the contacts of A with B those along m: none where their features do not lie opposite each other there. All that A shares
 // with B is then in the layer out of which C lifts it. What stands above the plane is run against as before. The children of a
 // compound and the triangles of a mesh are looked at one by one; among its own triangles a mesh has no seams
-// (composite_pairs.h), and none of its own contacts is a C for them: over its edge each of two faces lies below the other's plane.
+// (composite_pairs.h), and a mesh is no C for its own: over its edge each of two faces lies below the other's plane. The parts of a
+// compound are C and B to each other, of whatever shape.
 #pragma once
 
 #include <cstdint>
@@ -32,6 +33,7 @@ struct Rest {
   Vector3 point;                // of the other's surface
   double depth;                 // m
   std::size_t pair = kSeveral;  // whose contact it is
+  std::uint64_t part = 0;       // of the other body (Parts)
 
   static constexpr std::size_t kSeveral = ~std::size_t{0};
 
@@ -46,9 +48,9 @@ struct PairRests {
   std::span<const Rest> of_a, of_b;
   Vector3 origin = Vector3::Zero();  // of the frame that shapes are placed in, world; as are the rests
   std::size_t pair = 0;              // the one that is looked at
-  bool has_parts = false;            // of it one is a compound
+  Parts parts{};                     // of it
 
-  void swap() { std::swap(of_a, of_b); }
+  void swap() { std::swap(of_a, of_b), parts.swap(); }
   bool are_none() const { return of_a.empty() && of_b.empty(); }
 };
 
@@ -58,12 +60,18 @@ double flush_length(const Shape& a, const Shape& b);
 // Replaces the contacts of two bounded convex shapes, in a frame F with world axes, where the above asks for it.
 void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
                double margin, Manifold* manifold);
-// The same of a triangle of a mesh, whose front is to this side (unit), and a convex part, with the contacts in the frame of the
-// triangle, which lies at X_FA.
-void lay_flush(const PlacedPair& pair, const Vector3& front, const Pose& X_FA, const PairRests& rests, double flush,
+// Of a triangle of a mesh, and what it touches: the side (unit) to which contacts lead out of the mesh, in the frame of the triangle.
+struct Fronts {
+  Vector3 of_a;
+  Vector3 of_b = Vector3::Zero();  // zero: b is a convex part, not a triangle
+};
+
+// The same of a triangle of a mesh and a convex part or another triangle, with the contacts in the frame of the triangle, which
+// lies at X_FA.
+void lay_flush(const PlacedPair& pair, const Fronts& fronts, const Pose& X_FA, const PairRests& rests, double flush,
                double margin, Manifold* manifold);
 // The normal that it takes instead of this one, both in the frame of the triangle; zero where it leaves that.
-Vector3 flush_normal(const PlacedPair& pair, const Vector3& front, const Vector3& normal, const Pose& X_FA,
+Vector3 flush_normal(const PlacedPair& pair, const Fronts& fronts, const Vector3& normal, const Pose& X_FA,
                      const PairRests& rests, double flush);
 
 class Seams {

@@ -206,6 +206,22 @@ TEST(Mesh, MeshStandsOnMesh) {
   }
 }
 
+// Of which the slab's side was told 2.67 m deep, where the block's side crosses it and is turned to it by a rounding.
+TEST(Mesh, MeshOverAnEdgeOfMeshStandsOnIt) {
+  Shapes shapes;
+  const Shape &block = shapes.box_mesh({1.0, 0.2, 1.0}), &slab = shapes.box_mesh({0.7, 0.1, 1.7});
+  for (const double turn : {0.0, 1e-18, 1e-16, 1e-14, 1e-12})
+    for (const Vector3& axis : {Vector3(1.0, 0.0, 0.0), Vector3(0.0, 0.0, 1.0)}) {
+      const Pose X{Vector3(0.3, 0.297, 0.03), Quaternion(1.0, turn * axis.x(), 0.0, turn * axis.z())};
+      const ContactList contacts = all_contacts(block, at(0, 0, 0), slab, X, 1e-3);
+      ASSERT_GT(contacts.size(), 0U) << turn;
+      for (std::size_t i = 0; i < contacts.size(); ++i) {
+        EXPECT_NEAR(contacts[i].normal.y(), 1.0, 1e-9) << turn;
+        EXPECT_NEAR(contacts[i].depth, 0.003, 1e-9) << turn;
+      }
+    }
+}
+
 TEST(Mesh, ZeroAreaTrianglesChangeNothing) {
   Shapes shapes;
   const Shape& clean = shapes.field(1);

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+#include <utility>
+#include <vector>
+
 #include "tests/workers/collision/standard/shape_fixture.h"
 #include "workers/collision/standard/narrow_phase.h"
 
@@ -19,6 +23,21 @@ class OverASeam : public ::testing::Test {
   // the floor before the seam
   const Rest floor{Vector3::UnitY(), Vector3::Zero(), 0.002};
 
+  // Contacts of these pairs of these shapes, by what each body rests on.
+  static void mend(const std::vector<Shape>& bodies, const std::vector<Pose>& poses,
+                   const std::vector<std::uint32_t>& pairs, std::vector<ContactList>* lists) {
+    std::vector<std::uint32_t> shape(bodies.size());
+    std::iota(shape.begin(), shape.end(), 0U);
+    std::vector<double> position(3 * bodies.size()), orientation(4 * bodies.size());
+    const std::vector<double> same_position(3 * bodies.size());
+    std::vector<double> same_orientation(4 * bodies.size());
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      set_vector(position, i, poses[i].position);
+      set_quaternion(orientation, i, poses[i].orientation);
+      set_quaternion(same_orientation, i, Quaternion::Identity());
+    }
+    Seams().mend(bodies, {shape, same_position, same_orientation, position, orientation}, pairs, 0.001, *lists);
+  }
   // With the body first or second, and the normal always away from the tile.
   ContactList contacts(const Shape& other, const Pose& X_WB, const Rest& rest, bool is_first) {
     const PairRests rests = is_first ? PairRests{{&rest, 1}, {}} : PairRests{{}, {&rest, 1}};
@@ -146,6 +165,33 @@ TEST_F(OverASeam, ChildrenOfACompoundAreLookedAtOneByOne) {
   const ContactList list = contacts(floor_of_two, at(0.0, -0.5, 0.0), floor, true);
   ASSERT_GT(list.size(), 0U);
   for (std::size_t i = 0; i < list.size(); ++i) EXPECT_NEAR(list[i].normal.y(), -1.0, 1e-12);
+}
+
+// Of one pair: the parts of a compound are looked at one by one, and each knows what the body has of the others. A ball and a can that
+// lies have no face of their own to lay it along.
+TEST_F(OverASeam, TheNextPartOfACompoundIsLaidFlushToo) {
+  const Shape& block = shapes.box_mesh({0.5, 0.5, 0.5});
+  const Shape& ball = shapes.primitive(SceneShape::Kind::kSphere, Vector3::Constant(0.1));
+  const Shape& can = shapes.primitive(SceneShape::Kind::kCylinder, Vector3::Constant(0.1));
+  const Pose lying = at(where.position, Vector3::UnitZ(), 0.5 * EIGEN_PI);
+  for (const Shape* left : {&tile, &block})
+    for (const Shape* right : {&tile, &block}) {
+      const Shape& floor = shapes.compound({{left, at(0.0, -0.5, 0.0)}, {right, at(1.0, -0.5, 0.0)}});
+      for (const auto& [body, X] : std::vector<std::pair<const Shape*, Pose>>{
+               {&box, where}, {&ball, at(0.49, 0.098, 0.0)}, {&can, where}, {&can, lying}}) {
+        for (const bool is_first : {true, false}) {
+          std::vector<ContactList> lists(1);
+          if (is_first)
+            collide(*body, X, floor, Pose(), 0.001, &lists[0]);
+          else
+            collide(floor, Pose(), *body, X, 0.001, &lists[0]);
+          mend({floor, *body}, {Pose(), X}, is_first ? std::vector{1U, 0U} : std::vector{0U, 1U}, &lists);
+          ASSERT_GT(lists[0].size(), 0U);
+          for (std::size_t i = 0; i < lists[0].size(); ++i)
+            EXPECT_NEAR(lists[0][i].normal.y(), is_first ? -1.0 : 1.0, 1e-12);
+        }
+      }
+    }
 }
 
 TEST_F(OverASeam, ABallThatHasNotPassedItFeelsTheFloorAlone) {
