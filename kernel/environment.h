@@ -239,13 +239,13 @@ class Environment : private DerivativeSource, private SlotObserver {
   void note_what_joints_take();
   static std::string why_joints_took(double share, std::uint32_t step);
   static std::string why_shortened(std::uint32_t times, std::uint32_t step);  // flights.cc
-  // stops.cc: inner steps that end where stops are met.
-  void meet_stops(double begin, double length);
+  void meet_stops(double begin, double length);  // stops.cc: inner steps that end where stops are met
   double next_stop(const Trusted<TrialState>& trial, double begin, double length, double* crossing);
   void find_stops(bool of_trial, std::vector<StopGap>* stops) const;
   void note_what_joints_bear();                                         // openings.cc
   Trusted<TrialState> integrate_shorter(double begin, double* length);  // flights.cc
-  Trusted<TrialState> end_where_joints_let_go(Trusted<TrialState> trial, double begin, double* length);
+  bool end_where_joints_let_go(double begin, double* length, Trusted<TrialState>* trial);
+  std::optional<Trusted<Solution>> react_holding_limits(const Trusted<TrialState>& trial);
   double length_of_flight(double begin, double length);  // of a stop that opens and is pressed again
   // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
   std::uint64_t most_reaction_blocks() const;
@@ -411,7 +411,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::pair<std::vector<std::uint64_t>, std::vector<double>> first_impulses_, guess_;  // of contacts, per s
   std::vector<double> start_gaps_, trial_gaps_;                                        // of limits
   std::vector<StopGap> first_stops_, start_stops_, end_stops_, trial_stops_;
-  std::vector<double> borne_, first_borne_, least_borne_, most_borne_;  // N, by joints in derivatives of a trial
+  std::vector<double> borne_, told_borne_, first_borne_, least_borne_, most_borne_;  // N, by joints in derivatives
   std::vector<double> start_impulse_;  // N s, of joints, where the step begins (Smooth)
   std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;  // pairs
   double margin_ = 0.0;

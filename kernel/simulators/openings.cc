@@ -57,9 +57,8 @@ void Environment::note_what_joints_bear() {
   }
 }
 
-// The trial, which is in S*, or a shorter one that ends just behind where the first lets go of the limits and drives that hold at
-// its beginning.
-Trusted<TrialState> Environment::end_where_joints_let_go(Trusted<TrialState> trial, double begin, double* length) {
+// Makes the trial, which is in S*, end just behind where the first lets go of the limits and drives that hold at its beginning; has it?
+bool Environment::end_where_joints_let_go(double begin, double* length, Trusted<TrialState>* trial) {
   const auto lets_go = [&] {
     for (std::size_t i = 0; i < least_borne_.size(); ++i) {
       const double borne = may_open(data_.discrepancies, i) ? least_borne_[i] : most_borne_[i];
@@ -68,7 +67,7 @@ Trusted<TrialState> Environment::end_where_joints_let_go(Trusted<TrialState> tri
     }
     return false;
   };
-  if (!lets_go() || data_.derivative_time[0] - data_.time[0] < kNearEnd * *length) return trial;
+  if (!lets_go() || data_.derivative_time[0] - data_.time[0] < kNearEnd * *length) return false;
   const double finest = kOpeningShare * *length;
   double holds = 0.0, open = *length;  // the trials that are closest to it
   double known = 0.0, zero = open, next = 0.5 * open;
@@ -76,7 +75,7 @@ Trusted<TrialState> Environment::end_where_joints_let_go(Trusted<TrialState> tri
   for (int i = 1; i <= kMostOpeningLooks && open - known > finest; ++i) {
     double tried =
         i % kHalvedLooks == 0 ? 0.5 * (holds + open) : std::clamp(next, holds + 0.5 * finest, open - 0.5 * finest);
-    trial = integrate_shorter(begin, &tried);
+    *trial = integrate_shorter(begin, &tried);
     if (lets_go()) {
       open = tried;
       next = 0.5 * (holds + open);
@@ -96,7 +95,19 @@ Trusted<TrialState> Environment::end_where_joints_let_go(Trusted<TrialState> tri
     }
   }
   *length = open;
-  return data_.time_step[0] == open ? trial : integrate_shorter(begin, length);
+  if (data_.time_step[0] != open) *trial = integrate_shorter(begin, length);
+  return true;
+}
+
+// Where an inner step ends just behind an opening the limit still holds: what the method is off by to its free side is put right, as
+// where any limit bears. No joint is told to bear that.
+std::optional<Trusted<Solution>> Environment::react_holding_limits(const Trusted<TrialState>& trial) {
+  told_borne_.assign(data_.held_force.span().begin(), data_.held_force.span().end());
+  for (std::size_t i = 0; i < std::min(told_borne_.size(), first_borne_.size()); ++i)
+    if (told_borne_[i] == 0.0 && may_open(data_.discrepancies, i)) data_.held_force[i] = first_borne_[i];
+  std::optional<Trusted<Solution>> solution = react(trial);
+  if (told_borne_.size() == data_.held_force.size()) std::ranges::copy(told_borne_, data_.held_force.data());
+  return solution;
 }
 
 }  // namespace gravitas::kernel

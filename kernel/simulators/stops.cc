@@ -18,11 +18,10 @@ namespace gravitas::kernel {
 namespace {
 
 constexpr int kManyInnerSteps = 10, kMostMeetings = 1000, kMostLooks = 100;
-constexpr double kReach = 4.0;         // of the inner step before: how long a trial is after many, or a refusal
-constexpr double kCrossing = 1e-9;     // of the step, that an inner step which passes a stop is long
-constexpr double kShortestHop = 1e-6;  // of the step
-constexpr double kLeadGap = 1e-8;      // of its reach: gap at which a step ends before a stop
-constexpr int kHalved = 4;             // every so many trials, whatever the cubics say
+constexpr double kReach = 4.0;  // of the inner step before: how long a trial is after many, or a refusal
+constexpr double kCrossing = 1e-9, kShortestHop = 1e-6;  // of the step: an inner step that passes a stop; a flight
+constexpr double kLeadGap = 1e-8;                        // of its reach: gap at which a step ends before a stop
+constexpr int kHalved = 4;                               // every so many trials, whatever the cubics say
 
 }  // namespace
 
@@ -33,9 +32,10 @@ void Environment::meet_stops(double begin, double length) {
     const double asked = std::min(crossing > 0.0 ? crossing : inner < kMostMeetings ? reach : left, left);
     double stop = asked;
     Trusted<TrialState> trial = integrate_shorter(begin + done, &stop);
+    bool lets_go = false;
     const bool is_short = stop < asked || reach < length || inner >= kManyInnerSteps;
     if (crossing == 0.0 && inner < kMostMeetings) {
-      trial = end_where_joints_let_go(trial, begin + done, &stop);
+      lets_go = end_where_joints_let_go(begin + done, &stop, &trial);
       stop = next_stop(trial, begin + done, stop, &crossing);
       if (is_short) reach = kReach * stop;
     } else {
@@ -45,7 +45,7 @@ void Environment::meet_stops(double begin, double length) {
       begin_inner_step(begin + done, stop);
       trial = integrate();
     }
-    if (!write_what_joints_bear(trial, react(trial))) return;
+    if (!write_what_joints_bear(trial, lets_go ? react_holding_limits(trial) : react(trial))) return;
     end_inner_step();
     done = stop == left ? length : done + stop;
   }
