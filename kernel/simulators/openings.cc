@@ -103,8 +103,8 @@ bool Environment::end_where_joints_let_go(double begin, double* length, Trusted<
 // where any limit bears. No joint is told to bear that.
 std::optional<Trusted<Solution>> Environment::react_holding_limits(const Trusted<TrialState>& trial) {
   told_borne_.assign(data_.held_force.span().begin(), data_.held_force.span().end());
-  for (std::size_t i = 0; i < std::min(told_borne_.size(), first_borne_.size()); ++i)
-    if (told_borne_[i] == 0.0 && may_open(data_.discrepancies, i)) data_.held_force[i] = first_borne_[i];
+  for (std::size_t i = 0; i < std::min(told_borne_.size(), least_borne_.size()); ++i)
+    if (least_borne_[i] == 0.0 && may_open(data_.discrepancies, i)) data_.held_force[i] = first_borne_[i];
   std::optional<Trusted<Solution>> solution = react(trial);
   if (told_borne_.size() == data_.held_force.size()) std::ranges::copy(told_borne_, data_.held_force.data());
   return solution;

@@ -34,7 +34,7 @@ class Project {
 cmake_minimum_required(VERSION 3.25)
 project(small LANGUAGES CXX)
 set(CMAKE_UNITY_BUILD ON)
-set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_SOURCE_DIR}/deploy/compile ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR})
+set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_SOURCE_DIR}/deploy/compile ${CMAKE_SOURCE_DIR})
 add_compile_options(-g -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. "SHELL:-Xclang -fno-pch-timestamp")
 include_directories(${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
 file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/answer.h CONTENT "inline int answer() { return 42; }")

@@ -27,10 +27,11 @@
 // Hairer, Lubich, Wanner, Geometric Numerical Integration, VII.1.
 // The equations in (v_bar, W) are solved to rounding: by iteration where that contracts, else by Newton's method with
 // the matrix from the wrenches' Jacobian where it can be had (wrench_jacobian.h), else by differences (six derivatives per
-// body of the largest group that feels each other, interaction_groups.h). Stability: none is lost at any h k; but
-// the method does not damp, so what it does not resolve keeps ringing (Rosenbrock damps). Known failure: attitudes of a
-// body that turns by more than a radian a step lag (tan of the half angle); where no solution is found (forces that
-// jump, h |w| in the tens and unequal moments) the step is refused.
+// body of the largest group that feels each other, interaction_groups.h). Stability: none is lost at any h k where forces are
+// linear; but the method does not damp, so what it does not resolve keeps ringing (Rosenbrock damps). Known failures: a stiff spring
+// that turns is given energy, damped or not (1 kg on 1 m at 1e8 N/m, damping ratio 0.3, under gravity at 1/60 s: 0.5 J become
+// 41 in a second); attitudes of a body that turns by more than a radian a step lag (tan of the half angle); where no solution is
+// found (forces that jump, h |w| in the tens and unequal moments) the step is refused.
 #include <algorithm>
 #include <cmath>
 #include <utility>
