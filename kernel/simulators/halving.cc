@@ -51,12 +51,10 @@ double Environment::bisect(const Trusted<TrialState>& trial, double begin, doubl
       // what rolls or slides on is the solver's, what flies up is not
       const bool goes_on = touches && start_speed(i) * data_.time_step[0] <= nothing;
       if (goes_on || data_.contact_depth[i] <= nothing) continue;
-      if (gap_at(i, front()) > nothing)
-        was_apart = true;
-      else if (touches)
-        comes_back = true;
-      else
-        doubtful.insert(doubtful.end(), contact_pair(i).begin(), contact_pair(i).end());
+      const bool was_open = gap_at(i, front()) > nothing;
+      was_apart = was_apart || was_open;
+      comes_back = comes_back || touches;
+      if (!touches && !was_open) doubtful.insert(doubtful.end(), contact_pair(i).begin(), contact_pair(i).end());
     }
     if (was_apart || doubtful.empty()) return was_apart;
     if (!knows_overlapping) {
