@@ -194,10 +194,18 @@ void EditedScene::keep_stopped() {
   }
 }
 
+Pose EditedScene::recentred(const Pose& pose, std::uint32_t body) const {
+  const kernel::BodyDescription &next = description_.bodies[body], &old = before_.bodies[old_body_[body]];
+  if (is_same(old.geometry, next.geometry)) return pose;
+  Pose now = compose(compose(pose, old.geometry), inverse(next.geometry));
+  now.orientation.normalize();
+  return now;
+}
+
 Pose EditedScene::moved(Pose pose, std::uint32_t body) const {
   const kernel::BodyDescription &next = description_.bodies[body], &old = before_.bodies[old_body_[body]];
   const scene::SetMotion motion = motion_set_of(log_, next.id);
-  if (!motion.position && !motion.orientation && is_same(old.geometry, next.geometry)) return pose;
+  if (!motion.position && !motion.orientation) return recentred(pose, body);
   Pose frame = compose(pose, old.geometry);
   const Pose wanted = compose(next.pose, next.geometry);
   if (motion.position) frame.position = wanted.position;
@@ -217,12 +225,15 @@ void EditedScene::find_motions(const kernel::Environment& now) {
     if (row != kNone && ((body.flags & kCarried) != 0 || has_stopped(i)) && now.step_count() > 0) {
       const scene::SetMotion motion = motion_set_of(log_, body.id);
       const kernel::BodyDescription& old = before_.bodies[row];
-      pose = moved({vector_at(state.position, row), quaternion_at(state.orientation, row)}, i);
+      const Pose stood = {vector_at(state.position, row), quaternion_at(state.orientation, row)};
+      const Twist was = {vector_at(state.linear_velocity, row), vector_at(state.angular_velocity, row)};
+      pose = moved(stood, i);
       if (body.motion.surface != old.motion.surface && !body.motion.empty())
         twist = MotionCurve(body.motion, body.geometry).at(now.time()).twist;
       else if (!motion.linear_velocity)
-        twist.linear = vector_at(state.linear_velocity, row);
-      if (!motion.angular_velocity) twist.angular = vector_at(state.angular_velocity, row);
+        // of what of the body is at its centre of mass now
+        twist.linear = was.linear + was.angular.cross(recentred(stood, i).position - stood.position);
+      if (!motion.angular_velocity) twist.angular = was.angular;
     } else if (!body.motion.empty() && now.step_count() > 0) {
       const MotionCurve::State there = MotionCurve(body.motion, body.geometry).at(now.time());
       pose = there.pose;
@@ -252,6 +263,20 @@ void EditedScene::write_places() {
   }
 }
 
+Pose EditedScene::kept_binding(std::size_t joint, std::size_t end) const {
+  const auto body_of = [&](const kernel::ConstraintDescription& one) { return end == 0 ? one.body1 : one.body2; };
+  const std::uint32_t body = body_of(description_.constraints[joint]);
+  if (body == kNone) return {};
+  const kernel::ConstraintDescription& before = before_.constraints[old_joint_[joint]];
+  if (before.bound_at) return recentred(before.bound_at->at(end), body);
+  const kernel::BodyDescription &next = description_.bodies[body], &old = before_.bodies[body_of(before)];
+  const scene::SetMotion motion = motion_set_of(log_, next.id);
+  // to the bit as in the edited scene's text, which has its geometry where it was at the start
+  if (!motion.position && !motion.orientation && next.motion.rows == old.motion.rows)
+    return without_negative_zeros(next.pose);
+  return recentred(without_negative_zeros(old.pose), body);
+}
+
 // Where the edit says that bodies were; joints that stay are bound as they were.
 void EditedScene::place() {
   std::map<std::string, Pose> places;
@@ -269,21 +294,17 @@ void EditedScene::place() {
     const auto found = places.find(description_.bodies[body].id);
     return found == places.end() ? without_negative_zeros(description_.bodies[body].pose) : found->second;
   };
-  for (std::uint32_t i = 0; i < description_.bodies.size(); ++i)
-    if (has_stopped(i)) description_.bodies[i].pose = place_of(i);
-  const auto initial = [&](std::uint32_t body) {
-    return body == kNone ? Pose{} : without_negative_zeros(before_.bodies[body].pose);
-  };
   for (std::size_t j = 0; j < description_.constraints.size(); ++j) {
     kernel::ConstraintDescription& joint = description_.constraints[j];
-    if (old_joint_[j] == kNone) {
+    joint.is_kept = old_joint_[j] != kNone;
+    if (joint.is_kept)
+      joint.bound_at = {kept_binding(j, 0), kept_binding(j, 1)};
+    else
       joint.bound_at = {place_of(joint.body1), place_of(joint.body2)};
-    } else {
-      const kernel::ConstraintDescription& old = before_.constraints[old_joint_[j]];
-      joint.bound_at = old.bound_at ? old.bound_at : std::array{initial(old.body1), initial(old.body2)};
-      joint.is_kept = true;
-    }
   }
+  // after the joints: these are bound where the scene has them
+  for (std::uint32_t i = 0; i < description_.bodies.size(); ++i)
+    if (has_stopped(i)) description_.bodies[i].pose = place_of(i);
 }
 
 namespace {

@@ -5,8 +5,8 @@
 //   Successor successor = next.succeed(now, …);                          new processes; throws BadInput. The state, its hash
 //                                                                        chain with the edit in it, and swaps that were made
 //
-// A body, joint, force … that keeps its id goes on: a body where it is and as fast as it is, but for what the edit sets
-// of Position, Orientation (of its geometry's frame), LinearVelocity (of its centre of mass) and AngularVelocity; a joint
+// A body, joint, force … that keeps its id goes on: a body where it is and as fast as it is, also where its centre of mass
+// or principal axes become others, but for what the edit sets of Position, Orientation (of its geometry's frame), LinearVelocity (of its centre of mass) and AngularVelocity; a joint
 // bound as it was, and broken if it was. Who is added is as the scene's text says, a joint bound where the bodies are
 // now, a force as of now; one that was removed and added again is new. Forces that act once act at t = 0: they cannot be
 // added later. An edit wakes whom it disturbs (disturbance.h), lets integrators begin their histories again, and keeps the
@@ -76,10 +76,15 @@ class EditedScene {
   void read_changes(const RunOptions& options, Catalog* catalog);
   void find_kept();
   void keep_stopped();
-  // Of a body that went on in this pose: where the edit has it.
+  // Of a body that went on in this pose: the pose of the centre of mass and principal axes that it has after the edit, while
+  // its geometry stays.
+  Pose recentred(const Pose& pose, std::uint32_t body) const;
+  // And where the edit has it.
   Pose moved(Pose pose, std::uint32_t body) const;
   void find_motions(const kernel::Environment& now);
   void write_places();
+  // In which pose a joint that stays is bound to its body 1 or 2 (`end` 0 or 1).
+  Pose kept_binding(std::size_t joint, std::size_t end) const;
   void place();
   void refuse_late_impulses() const;
   void warn_of_broken(const kernel::Environment& now);

@@ -19,6 +19,7 @@ inline constexpr double kStep = 0.01;  // s
 
 struct Row {
   Vector3 position, velocity;
+  Quaternion orientation;
 };
 
 // A scene, its edits, and where it ends.
@@ -55,7 +56,8 @@ struct EditedRun {
       const auto vector = [&](std::size_t i) {
         return Vector3(std::stod(cells[i]), std::stod(cells[i + 1]), std::stod(cells[i + 2]));
       };
-      rows[cells[1]] = {vector(2), vector(9)};
+      const Vector3 turn = vector(6);
+      rows[cells[1]] = {vector(2), vector(9), {std::stod(cells[5]), turn.x(), turn.y(), turn.z()}};
     }
     return rows;
   }
