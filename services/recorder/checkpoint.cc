@@ -85,8 +85,8 @@ void set_hash(const Hash& hash, recorder::v1::Hash* message) {
 Hash hash_of(const recorder::v1::Hash& message) { return {message.low(), message.high()}; }
 
 bool is_possible(const recorder::v1::Tally& tally) {
-  for (const double number :
-       {tally.largest_kinetic_energy(), tally.largest_energy_deviation(), tally.penetration(), tally.joint_error()})
+  for (const double number : {tally.largest_kinetic_energy(), tally.largest_energy_deviation(), tally.penetration(),
+                              tally.joint_error(), tally.overlap().depth()})
     if (!(number >= 0.0)) return false;  // infinite where squares of speeds overflow
   return std::ranges::all_of(tally.meetings(), [](const recorder::v1::Meeting& meeting) {
     return std::isfinite(meeting.time()) && std::isfinite(meeting.speed());

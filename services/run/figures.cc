@@ -284,6 +284,13 @@ void Figures::write(recorder::v1::Tally* tally) const {
   tally->set_joint_error(joint_error_);
   tally->set_most_calls(effort_.calls);
   tally->set_most_calls_step(effort_.step);
+  if (overlap_.depth > 0.0) {
+    recorder::v1::Overlap* overlap = tally->mutable_overlap();
+    overlap->set_one(overlap_.one);
+    overlap->set_two(overlap_.two);
+    overlap->set_depth(overlap_.depth);
+    overlap->set_others(static_cast<std::uint32_t>(overlap_.others));
+  }
   if (!initial_) return;
   tally->set_initial_energy(initial_->energy());
   tally->clear_initial_momenta();
@@ -298,6 +305,7 @@ void Figures::resume(const recorder::v1::Tally& tally, bool was_edited) {
   penetration_ = tally.penetration();
   joint_error_ = tally.joint_error();
   effort_ = {tally.most_calls(), tally.most_calls_step()};
+  overlap_ = {tally.overlap().one(), tally.overlap().two(), tally.overlap().depth(), tally.overlap().others()};
   if (was_edited) {
     runaway_.reset();
     opening_step_.reset();

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "services/run/session.h"
@@ -16,6 +17,7 @@
 namespace gravitas {
 namespace {
 
+using harness::run_quietly;
 using harness::ScratchFolder;
 using ::testing::AllOf;
 using ::testing::DoubleNear;
@@ -208,6 +210,31 @@ Environment { Space { Bodies {
   }
 }
 
+TEST(Figures, TellOfAnOverlapAtTheStartBeforeACheckpoint) {
+  const ScratchFolder folder;
+  RunOptions options;
+  options.scenes = {folder.write("scene.gravitas", R"(
+Geometries { Geometry { Type = "Sphere" Id = "Ball" CustomProperties { Radius = 0.3 } } }
+Environment { Space { Bodies {
+  Body { Id = "A" GeometryId = "Ball" Mass = 1 }
+  Body { Id = "B" GeometryId = "Ball" Mass = 1 KineticProperties { Position = {0.45, 0, 0} } }
+  Body { Id = "C" GeometryId = "Ball" Mass = 1 KineticProperties { Position = {0.95, 0, 0} } } } } })")};
+  options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
+  for (const std::uint32_t stop : {0U, 2U}) {
+    options.steps = stop;
+    options.checkpoint = folder.path("checkpoint");
+    run_quietly(options);
+    options.steps = 4;
+    options.resume = std::exchange(options.checkpoint, "");
+    const report::v1::Report report = run_quietly(options).report;
+    ASSERT_EQ(report.warnings_size(), 1) << stop;
+    EXPECT_THAT(report.warnings(0),
+                HasSubstr("at the start bodies \"A\" and \"B\" overlap by 0.15 m, and 1 more pair:"))
+        << stop;
+    options.resume.clear();
+  }
+}
+
 // What slides lies elsewhere on the other after the first step, which pushes it out.
 TEST(Figures, AnOverlapOfWhatSlidesAtTheStartIsPenetration) {
   for (const char* simulator : {"Basic", "Substepping", "Continuous", "Bisection"}) {
@@ -289,7 +316,7 @@ Environment { Space { Bodies {
   Body { Id = "TheOneThatRunsAway" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { Position = {1, 0, 0} } Forces = { "Stiff" } } } } })")};
   options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
   options.edits = {"remove Body.A@step=50", "remove Body.TheOneThatRunsAway@step=55"};
-  const RunResult result = harness::run_quietly(options);
+  const RunResult result = run_quietly(options);
   EXPECT_THAT(result.report.warnings(), ::testing::Contains(HasSubstr("body \"TheOneThatRunsAway\" went ")));
 }
 
@@ -332,7 +359,7 @@ TEST(Figures, TellOfADearStepBeforeACheckpoint) {
   ASSERT_EQ(first.report.steps(), 1U);
   options.resume = options.checkpoint;
   options.checkpoint.clear();
-  const RunResult second = harness::run_quietly(options);
+  const RunResult second = run_quietly(options);
   EXPECT_EQ(second.report.steps(), 2U);
   const auto is_dear = ::testing::Contains(HasSubstr("step 1 took "));
   EXPECT_THAT(first.report.warnings(), is_dear);
@@ -344,7 +371,7 @@ TEST(Figures, CallsOfComparisonsMakeNoStepDear) {
   const ScratchFolder folder;
   RunOptions options = dear_steps(folder);
   const auto calls = [&] {
-    const RunResult result = harness::run_quietly(options);
+    const RunResult result = run_quietly(options);
     for (const std::string& warning : result.report.warnings())
       if (warning.find("calls of plugins") != std::string::npos) return warning;
     return std::string();
