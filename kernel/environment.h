@@ -406,10 +406,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::vector<std::uint32_t> broken_;    // joints, under their load in the inner step that is being made
   std::optional<Trusted<Pairs>> pairs_;  // the last
   Extrapolation extrapolation_, jumps_;
-  static constexpr std::uint32_t kMostPieces = 8;                                      // of a part that is extrapolated
-  std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;   // of velocities
-  std::pair<std::vector<std::uint64_t>, std::vector<double>> first_impulses_, guess_;  // of contacts, per s
-  std::vector<double> start_gaps_, trial_gaps_;                                        // of limits
+  static constexpr std::uint32_t kMostPieces = 8;                                     // of a part that is extrapolated
+  std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities
+  std::pair<std::vector<std::uint64_t>, std::vector<double>> first_impulses_, found_, guess_;  // of contacts
+  std::vector<double> start_gaps_, trial_gaps_;                                                // of limits
   std::vector<StopGap> first_stops_, start_stops_, end_stops_, trial_stops_;
   std::vector<double> borne_, told_borne_, first_borne_, least_borne_, most_borne_;  // N, by joints in derivatives
   std::vector<double> start_impulse_;  // N s, of joints, where the step begins (Smooth)

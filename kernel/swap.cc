@@ -162,8 +162,8 @@ void StageSlot::cut_over(PendingSwap* swap) {
   SlotHost& host = *hosts_[swap->host];
   if (host.is_on_probation()) close_all_probations(&host, SwapState::kCommitted, {});
   SwapRecord& record = swaps_[swap->record];
-  record.state = swap->order.has_taken_over ? SwapState::kCommitted : SwapState::kProbation, record.step = step_;
-  swap->is_in_shadow = false, record.shadow = swap->shadow.result();
+  record.state = swap->order.has_taken_over ? SwapState::kCommitted : SwapState::kProbation;
+  record.step = step_, record.shadow = swap->shadow.result();
   host.cut_over(which_, std::move(swap->candidate), std::move(swap->next), swap->order.has_taken_over);
   if (!swap->order.has_taken_over) probation_.push_back({&host, swap->record});
   // who comes in is asked already: a comparison that is lost in that would be taken out from under this swap

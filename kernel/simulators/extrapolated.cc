@@ -49,7 +49,7 @@ void Environment::extrapolate_parts(double begin, double length) {
   bool has_failed = false;
   while (done < length && !must_restart_) {
     const double from = begin + done, left = length - done;
-    first_impulses_ = {};
+    first_impulses_.first.clear();
     NextStop stop{std::min(wanted, left)};
     if (has_contacts()) {
       begin_inner_step(from, stop.length);
@@ -93,17 +93,16 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
   };
   double error = 0.0;
   std::uint32_t enough = 0;
-  auto found = first_impulses_;
   try {
     for (std::uint32_t pieces = 1; pieces <= kMostPieces && enough == 0; ++pieces) {
       for (std::uint32_t i = 0; i < pieces; ++i) {
         if (!make_piece(begin, length, i, pieces) || must_restart_) return go_back(), 0;
         if (commit_listener_ != nullptr) commit_listener_->on_attempt(data_, pieces);
         if (i == 0) {
-          found.first.assign(data_.contact_key.span().begin(), data_.contact_key.span().end());
-          found.second.clear();
+          found_.first.assign(data_.contact_key.span().begin(), data_.contact_key.span().end());
+          found_.second.clear();
           for (const double impulse : data_.contact_impulse.span())
-            found.second.push_back(impulse / data_.time_step[0]);
+            found_.second.push_back(impulse / data_.time_step[0]);
         }
         if (i == 0) put_changes(&first_changes_[pieces - 1]), pressed_by_attempts_ = pressed_;
         if (i + 1 == pieces && !ends_with_impact) put_changes(&trial_changes_);
@@ -122,7 +121,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       error = now;
       if (!converges) break;
       // what stands in the end begins with what its attempt began with
-      if (enough == 0) first_impulses_ = found;
+      if (enough == 0) first_impulses_ = found_;
     }
     if (enough > 0 && sees_jumps && hides_jump(begin, length, first, enough, error)) enough = 0;
     go_back();

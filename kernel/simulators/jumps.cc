@@ -39,7 +39,7 @@ double turn_of_slip(const Model& model, std::uint32_t body) {
 // which friction that goes by it would seem to jump. So all that begins where a part does is given what an attempt before found there.
 bool Environment::make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces) {
   const double from = i * length / pieces, to = (i + 1) * length / pieces;
-  guess_.first.clear(), guess_.second.clear();
+  guess_.first.clear();  // of no contacts
   if (i == 0) guess_ = first_impulses_;
   begin_inner_step(begin + from, to - from);
   return make_next_state();

@@ -78,7 +78,8 @@ bool Environment::end_where_joints_let_go(double begin, double* length, Trusted<
     *trial = integrate_shorter(begin, &tried);
     if (lets_go()) {
       open = tried;
-      next = 0.5 * (holds + open);
+      // a zero that lies before it is the best that is known
+      if (!(next < open)) next = 0.5 * (holds + open);
       continue;
     }
     const double before = std::exchange(zero, time_of_letting_go(data_, borne_, holds, tried, open));

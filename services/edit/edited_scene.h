@@ -6,11 +6,12 @@
 //                                                                        chain with the edit in it, and swaps that were made
 //
 // A body, joint, force … that keeps its id goes on: a body where it is and as fast as it is, also where its centre of mass
-// or principal axes become others, but for what the edit sets of Position, Orientation (of its geometry's frame), LinearVelocity (of its centre of mass) and AngularVelocity; a joint
-// bound as it was, and broken if it was. Who is added is as the scene's text says, a joint bound where the bodies are
-// now, a force as of now; one that was removed and added again is new. Forces that act once act at t = 0: they cannot be
-// added later. An edit wakes whom it disturbs (disturbance.h), lets integrators begin their histories again, and keeps the
-// memory of contacts between bodies that were not moved and have the same shapes. All other collisions end with it.
+// or principal axes become others, but for what the edit sets of Position, Orientation (of its geometry's frame),
+// LinearVelocity (of its centre of mass) and AngularVelocity; a joint bound as it was, and broken if it was. Who is
+// added is as the scene's text says, a joint bound where the bodies are now, a force as of now; one that was removed and
+// added again is new. Forces that act once act at t = 0: they cannot be added later. An edit wakes whom it disturbs
+// (disturbance.h), lets integrators begin their histories again, and keeps the memory of contacts between bodies that
+// were not moved and have the same shapes. All other collisions end with it.
 //
 // The chain goes on as hash(hash(chain, digest of the changes), next state): a run that makes the same edits before the same
 // steps has the same chain, in any hosting, resumed or not.

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <string>
 
@@ -39,9 +40,9 @@ add_compile_options(-g -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. "SHELL:-Xclang -f
 include_directories(${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
 file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/answer.h CONTENT "inline int answer() { return 42; }")
 add_library(small STATIC lib/first.cc lib/second.cc)
-target_precompile_headers(small PRIVATE <cstddef>)
+target_precompile_headers(small PRIVATE <lib/common.h>)
 )");
-    write(tree + "/lib/first.h", header_);
+    for (const auto& [header, text] : headers_) write(tree + "/lib/" + header, text);
     write(tree + "/lib/first.cc", "#include \"lib/first.h\"\nconst char* first() { return __FILE__; }\n");
     write(tree + "/lib/second.cc", "#include \"answer.h\"\nstd::size_t second() { return answer(); }\n");
     return run("cd " + in_shell(tree) + " && cmake -G Ninja -B build -D CMAKE_CXX_COMPILER=clang++ && ninja -C build");
@@ -50,7 +51,7 @@ target_precompile_headers(small PRIVATE <cstddef>)
     return run("ninja -C " + in_shell(folder_.path() + "/" + name + "/build"));
   }
   void leave(const std::string& name) const { fs::remove_all(folder_.path() + "/" + name); }
-  void change_header() { header_ += "// changed\n"; }
+  void change(const std::string& header) { headers_.at(header) += "// changed\n"; }
   std::string library(const std::string& name) const {
     return content(folder_.path() + "/" + name + "/build/libsmall.a");
   }
@@ -80,7 +81,8 @@ target_precompile_headers(small PRIVATE <cstddef>)
   }
 
   const channel::PrivateFolder folder_;
-  std::string header_ = "const char* first();\n";
+  std::map<std::string, std::string> headers_ = {{"first.h", "const char* first();\n"},
+                                                 {"common.h", "#include <cstddef>\n"}};
 };
 
 TEST(Compile, ATreeInAnotherFolderIsServedWhatTheFirstOneCompiled) {
@@ -102,11 +104,15 @@ TEST(Compile, ATreeInAnotherFolderIsServedWhatTheFirstOneCompiled) {
 }
 
 TEST(Compile, WhatASourceIncludesIsCompiledAgainWhenItChanges) {
-  Project project;
-  project.build("place");
-  project.change_header();
-  EXPECT_THAT(project.build("place"), ContainsRegex("Building CXX object.*unity_0_cxx.cxx.o"));
-  EXPECT_EQ(project.misses(), 2);
+  for (const std::string header : {"first.h", "common.h"}) {
+    Project project;
+    project.build("place");
+    project.change(header);
+    EXPECT_THAT(project.build("place"), ContainsRegex("Building CXX object.*unity_0_cxx.cxx.o")) << header;
+    EXPECT_EQ(project.misses(), 2) << header;
+    project.build("other");
+    EXPECT_EQ(project.hits(), 1) << header;
+  }
 }
 
 }  // namespace

@@ -58,11 +58,11 @@ bool may_be_flush(std::span<const Rest> rests, const ContactList& contacts, doub
     for (std::size_t k = 0; k < contacts.size(); ++k) {
       const ContactPoint& contact = contacts[k];
       if (rest.is_along(side * contact.normal)) continue;
+      // where an edge is about to touch a side, it may be told at the middle of either
+      if (std::fabs(contact.depth) <= flush) return true;
       const double height = rest.height(contact.point);
       const double slack = flush + margin + kFlat * (contact.point - rest.point).norm();
       if (height <= slack && height >= rest.lowest() - slack) return true;
-      // where an edge is about to touch a side, it may be told at the middle of either
-      if (std::fabs(contact.depth) <= flush) return true;
     }
   return false;
 }
